@@ -1,0 +1,163 @@
+"""The estimator: a multiplicative, iterated, gated extended Kalman filter on ball pixels.
+
+The state's error has 12 components (see `state`); attitude errors multiply. A measurement is any set of ball
+sightings, each at its own camera's time. Nothing is stored between calls: a state goes in, a new state comes out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from filterpy.kalman import ExtendedKalmanFilter
+from scipy.stats import chi2
+
+from tracker import so3
+from tracker.measure import predicted_pixels
+from tracker.rig import Rig
+from tracker.state import ATTITUDE, Process, State, coasted, process_noise, transition
+from tracker.types import Array, BallSighting, Reason, Rejected
+
+MAX_ITERATIONS = 8
+CONVERGED_SIGMA = 0.02  # stop when the last step is this small against the posterior's own sigma
+MIN_BALLS_AFTER_REJECTION = 2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Update:
+    """An updated state, its NIS and degrees of freedom, what was used and what was left out."""
+
+    state: State
+    nis: float
+    dof: int
+    used: tuple[BallSighting, ...]
+    rejected: tuple[Rejected, ...]
+
+
+def predict(state: State, t_ns: int, process: Process) -> State:
+    """Carry a state and its covariance on to t_ns, which is not before the state's own time."""
+    dt = (t_ns - state.t_ns) * 1e-9
+    if dt < 0.0:
+        raise ValueError(f"cannot predict back by {-dt} s")
+    filter_ = _filter(state.P)
+    filter_.F = transition(state.w_BinB, dt)
+    filter_.Q = process_noise(process, dt)
+    filter_.predict()
+    ahead = coasted(state, t_ns)
+    return State(t_ns, ahead.p_BinW, ahead.R_BtoW, ahead.v_BinW, ahead.w_BinB, filter_.P)
+
+
+def update(state: State, sightings: tuple[BallSighting, ...], rig: Rig, probability: float) -> Update | Rejected:
+    """Correct a state by ball sightings, leaving out those that do not belong.
+
+    Args:
+        state: predicted to about the sightings' time.
+        probability: of a true sighting to pass each gate.
+    Returns:
+        Update; Rejected FRAME_GATE when what is left does not fit the prediction.
+    Source: each ball is gated on its innovation (Mahalanobis distance, 2 degrees of freedom). The rest is fitted
+        together; while the sum of squares does not fit its chi-square, the ball that the fit explains worst is left
+        out and the fit made again, as long as two are left. The prior is broad against a pixel, so it is the
+        marker's rigid shape that finds the liar.
+    """
+    kept, rejected = _gated(state, sightings, rig, probability)
+    while kept:
+        filter_, dx, leftover = _iterated(state, kept, rig)
+        nis = float(filter_.mahalanobis) ** 2
+        if nis <= float(chi2.ppf(probability, 2 * len(kept))):
+            return Update(_posterior(state, dx, filter_.P), nis, 2 * len(kept), tuple(kept), tuple(rejected))
+        if len(kept) <= MIN_BALLS_AFTER_REJECTION:
+            detail = f"NIS {nis:.0f} with {2 * len(kept)} degrees of freedom"
+            return Rejected(Reason.FRAME_GATE, detail, state.t_ns)
+        worst = int(np.argmax(leftover))
+        rejected.append(_gate_rejection(kept.pop(worst), rig, leftover[worst], "after the fit"))
+    return Rejected(Reason.FRAME_GATE, "no sighting near the prediction", state.t_ns)
+
+
+def _gated(
+    state: State, sightings: tuple[BallSighting, ...], rig: Rig, probability: float
+) -> tuple[list[BallSighting], list[Rejected]]:
+    """Part sightings by their own Mahalanobis distance from the prediction."""
+    limit = float(chi2.ppf(probability, 2))
+    z, h, H, R = _stacked(state, sightings, rig)
+    S = H @ state.P @ H.T + R
+    kept, rejected = [], []
+    for i, sighting in enumerate(sightings):
+        block = slice(2 * i, 2 * i + 2)
+        y = z[block] - h[block]
+        distance2 = float(y @ np.linalg.solve(S[block, block], y)) if np.isfinite(y).all() else np.inf
+        if distance2 <= limit:
+            kept.append(sighting)
+        else:
+            rejected.append(_gate_rejection(sighting, rig, distance2, "from the prediction"))
+    return kept, rejected
+
+
+def _gate_rejection(sighting: BallSighting, rig: Rig, distance2: float, where: str) -> Rejected:
+    """Say which ball was left out and how far off it was."""
+    name = rig.marker.balls[sighting.ball].name
+    return Rejected(Reason.GATE, f"{name}: {np.sqrt(distance2):.1f} sigma {where}", sighting.t_ns, sighting.camera)
+
+
+def _iterated(state: State, sightings: list[BallSighting], rig: Rig) -> tuple[ExtendedKalmanFilter, Array, Array]:
+    """Iterate the update about the newest estimate until it stands.
+
+    Returns:
+        The filter after its last update, the error dx (12,) against `state`, and each sighting's squared residual in
+        units of its own covariance (n,).
+    Source: iterated EKF, Bell and Cathey, IEEE Trans. Automatic Control 38 (1993): with H at the newest estimate and
+        dx its distance from the prior, the linear update's innovation is z - h + H dx (3). By the multiplicative
+        attitude, d/d dx = H diag(I, J_r(theta), I, I) (4).
+    """
+    dx = np.zeros(12)
+    size = 2 * len(sightings)
+    for _ in range(MAX_ITERATIONS):
+        z, h, H, R = _stacked(state.moved(dx), sightings, rig)
+        H[:, ATTITUDE] = H[:, ATTITUDE] @ so3.right_jacobian(dx[ATTITUDE])  # (4)
+        innovation = z - h + H @ dx  # (3)
+        filter_ = _filter(state.P, size)
+        filter_.update(innovation[:, None], lambda _x, H=H: H, lambda _x, n=size: np.zeros((n, 1)), R=R)
+        new = filter_.x[:, 0]
+        step = np.abs(new - dx) / np.sqrt(np.diag(filter_.P))
+        dx = new
+        if float(step.max()) < CONVERGED_SIGMA:
+            break
+    residual = (innovation - H @ dx).reshape(-1, 2)
+    leftover = np.array([r @ np.linalg.solve(s.cov_px, r) for r, s in zip(residual, sightings, strict=True)])
+    return filter_, dx, leftover
+
+
+def _posterior(prior: State, dx: Array, P: Array) -> State:
+    """Put the error into the nominal state and turn the attitude covariance with it.
+
+    Source: exp(theta + d) = exp(theta) exp(J_r(theta) d), so the error about the new attitude is J_r d.
+    """
+    G = np.eye(12)
+    G[ATTITUDE, ATTITUDE] = so3.right_jacobian(dx[ATTITUDE])
+    turned = G @ P @ G.T
+    moved = prior.moved(dx)
+    return State(prior.t_ns, moved.p_BinW, moved.R_BtoW, moved.v_BinW, moved.w_BinB, (turned + turned.T) / 2.0)
+
+
+def _stacked(state: State, sightings: list[BallSighting] | tuple[BallSighting, ...], rig: Rig) -> tuple[Array, ...]:
+    """Return z (2n,), h (2n,), H (2n, 12) and R (2n, 2n) of sightings, in their order."""
+    n = len(sightings)
+    z, h, H, R = np.empty(2 * n), np.empty(2 * n), np.empty((2 * n, 12)), np.zeros((2 * n, 2 * n))
+    seen: dict[tuple[int, int], tuple[Array, Array]] = {}
+    for i, sighting in enumerate(sightings):
+        view = (sighting.camera, sighting.t_ns)
+        if view not in seen:
+            seen[view] = predicted_pixels(state, rig.cameras[sighting.camera], rig.marker, sighting.t_ns)
+        uv_px, Hs = seen[view]
+        block = slice(2 * i, 2 * i + 2)
+        z[block], h[block], H[block], R[block, block] = (
+            sighting.uv_px, uv_px[sighting.ball], Hs[sighting.ball], sighting.cov_px,
+        )  # fmt: skip
+    return z, h, H, R
+
+
+def _filter(P: Array, dim_z: int = 2) -> ExtendedKalmanFilter:
+    """Return filterpy's EKF over the error state, whose mean is zero before every step."""
+    filter_ = ExtendedKalmanFilter(dim_x=12, dim_z=dim_z)
+    filter_.P = P
+    return filter_

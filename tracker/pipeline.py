@@ -1,0 +1,223 @@
+"""The tracker, top to bottom: a camera's frame goes in, the vehicle's pose comes out.
+
+    frame -> round of one instant -> look where the track expects the balls -> update the filter -> Estimate
+                                  -> nothing there: look everywhere, triangulate, eq. 4-6, start again
+
+It reads no clock but the stopwatch it is given, and touches no file and no device.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+from scipy.stats import chi2
+
+from tracker import so3
+from tracker.acquire import first_state
+from tracker.centre import Blur
+from tracker.detect import Blob
+from tracker.ekf import Update, predict, update
+from tracker.look import look_everywhere, look_near
+from tracker.rig import Rig
+from tracker.rounds import Rounds
+from tracker.state import State
+from tracker.tuning import Tuning
+from tracker.types import (
+    BallSighting,
+    Estimate,
+    Event,
+    Frame,
+    Reason,
+    Rejected,
+    Step,
+    TrackState,
+    frozen_array,
+)
+
+HISTORY = 8  # updates that a late frame can be put in before
+RESETS = 256
+
+Round = tuple[Frame, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Past:
+    """One update of the filter: the state after it and the sightings that made it."""
+
+    after: State
+    sightings: tuple[BallSighting, ...]
+
+
+@dataclass(slots=True, eq=False)
+class _Harvest:
+    """What the rounds of one step gave so far."""
+
+    sightings: list[BallSighting] = field(default_factory=list)
+    rejections: list[Rejected] = field(default_factory=list)
+    estimates: list[Estimate] = field(default_factory=list)
+
+
+class Tracker:
+    """Follow one marker through the frames of two to eight cameras.
+
+    rig: cameras and marker.  tuning: limits.  stopwatch: reads a running time [ns], for the stage times.
+    """
+
+    def __init__(self, rig: Rig, tuning: Tuning, stopwatch: Callable[[], int]) -> None:
+        self._rig = rig
+        self._tuning = tuning
+        self._stopwatch = stopwatch
+        self._rounds = Rounds(len(rig.cameras), tuning.sync_window_ns)
+        self._blurs = [Blur() for _ in rig.cameras]
+        self._past: deque[_Past] = deque(maxlen=HISTORY)
+        self._whole: dict[int, tuple[Frame, list[list[Blob]]]] = {}
+        self._track = TrackState.SEARCHING
+        self._resets = 0
+        self._sent_ns = -(2**63)
+
+    def step(self, event: Event) -> Step:
+        """Take one event of the source and return what came of it."""
+        harvest = _Harvest()
+        if isinstance(event, Rejected):
+            harvest.rejections.append(event)
+        elif isinstance(event, Frame) and (wrong := self._wrong_size(event)):
+            harvest.rejections.append(wrong)
+        else:
+            for frames in self._rounds.take(event):
+                self._take_round(frames, harvest)
+            self._watch_the_time(event.t_ns)
+        return self._step(harvest)
+
+    def finish(self) -> Step:
+        """Work off the round that was still open when the frames ended."""
+        harvest = _Harvest()
+        for frames in self._rounds.rest():
+            self._take_round(frames, harvest)
+        return self._step(harvest)
+
+    def _step(self, harvest: _Harvest) -> Step:
+        return Step(self._track, tuple(harvest.sightings), tuple(harvest.rejections), tuple(harvest.estimates))
+
+    def _wrong_size(self, frame: Frame) -> Rejected | None:
+        camera = self._rig.cameras[frame.camera]
+        height, width = frame.image.shape[:2]
+        if (width, height) == (camera.width_px, camera.height_px):
+            return None
+        detail = f"{camera.name}: {width} x {height} px, calibrated for {camera.width_px} x {camera.height_px}"
+        return Rejected(Reason.WRONG_SIZE, detail, frame.t_ns, frame.camera)
+
+    def _take_round(self, frames: Round, harvest: _Harvest) -> None:
+        """Follow the track through a round, or look for the marker in it, and say where it is."""
+        started_ns = self._stopwatch()
+        found = self._follow(frames, harvest) if self._track is TrackState.TRACKING else None
+        if found is None:
+            found = self._search(frames, harvest)
+        if found is None or found.state.t_ns <= self._sent_ns:
+            return
+        available_ns = max(frame.available_ns for frame in frames)
+        stages = {"wait": started_ns - available_ns, "track": self._stopwatch() - started_ns}
+        self._sent_ns = found.state.t_ns
+        harvest.estimates.append(self._estimate(found, available_ns, stages))
+
+    def _follow(self, frames: Round, harvest: _Harvest) -> Update | None:
+        """Update the track with a round; a late one is put in where it belongs and what came after is done again."""
+        t_ns = max(frame.t_ns for frame in frames)
+        later: list[_Past] = []
+        while self._past and self._past[-1].after.t_ns > t_ns:
+            later.insert(0, self._past.pop())
+        if not self._past:
+            self._past.extend(later)
+            harvest.rejections += [_late(frame) for frame in frames]
+            return None
+        ahead = predict(self._past[-1].after, t_ns, self._tuning.process)
+        result = self._see(frames, ahead, harvest)
+        for past in later:
+            start = self._past[-1].after
+            again = self._update(predict(start, past.after.t_ns, self._tuning.process), past.sightings)
+            result = again if isinstance(again, Update) else result
+        return result
+
+    def _see(self, frames: Round, ahead: State, harvest: _Harvest) -> Update | None:
+        """Look where a predicted state expects the balls and update it, or return None."""
+        seen: list[BallSighting] = []
+        for frame in frames:
+            look = look_near(frame, self._rig, ahead, self._blurs[frame.camera], self._tuning.pixel_noise_floor_px)
+            self._blurs[frame.camera] = look.blur
+            seen += look.sightings
+            harvest.rejections += look.rejections
+        result = self._update(ahead, tuple(seen))
+        if isinstance(result, Rejected):
+            harvest.rejections.append(result)
+            return None
+        harvest.sightings += result.used
+        harvest.rejections += result.rejected
+        return result
+
+    def _update(self, ahead: State, sightings: tuple[BallSighting, ...]) -> Update | Rejected:
+        """Update a predicted state and remember it."""
+        result = update(ahead, sightings, self._rig, self._tuning.gate_probability)
+        if isinstance(result, Update):
+            self._past.append(_Past(result.state, result.used))
+        return result
+
+    def _search(self, frames: Round, harvest: _Harvest) -> Update | None:
+        """Look for the marker in whole frames, this round's and the other cameras' newest; start the track on it."""
+        for frame in frames:
+            camera = self._rig.cameras[frame.camera]
+            self._whole[frame.camera] = (frame, look_everywhere(frame, camera, self._rig))
+        newest_ns = max(frame.t_ns for frame in frames)
+        fresh = {c: w for c, w in self._whole.items() if newest_ns - w[0].t_ns <= self._tuning.coast_limit_ns // 2}
+        start = first_state(fresh, self._rig, self._tuning.process)
+        if isinstance(start, Rejected):
+            harvest.rejections.append(start)
+            return None
+        before = self._past[-1].after if self._past else None
+        self._past.clear()
+        found = self._see(tuple(frame for frame, _ in fresh.values()), start, harvest)
+        if found is None:
+            self._past.extend([_Past(before, ())] if before is not None else [])
+            return None
+        self._whole.clear()
+        if before is not None and self._jumped(before, found.state):
+            self._resets = (self._resets + 1) % RESETS
+        self._track = TrackState.TRACKING
+        return found
+
+    def _jumped(self, before: State, found: State) -> bool:
+        """Say whether a pose found again is none that the old track can have led to."""
+        if not 0 <= found.t_ns - before.t_ns <= self._tuning.continuity_limit_ns:
+            return True
+        ahead = predict(before, found.t_ns, self._tuning.process)
+        error = np.concatenate((found.p_BinW - ahead.p_BinW, so3.log(ahead.R_BtoW.T @ found.R_BtoW)))
+        distance2 = float(error @ np.linalg.solve((ahead.P + found.P)[:6, :6], error))
+        return distance2 > float(chi2.ppf(self._tuning.gate_probability, 6))
+
+    def _watch_the_time(self, t_ns: int) -> None:
+        """Lose the track when nothing of it was seen for too long."""
+        if self._track is TrackState.TRACKING and t_ns - self._past[-1].after.t_ns > self._tuning.coast_limit_ns:
+            self._track = TrackState.LOST
+
+    def _estimate(self, found: Update, available_ns: int, stages: dict[str, int]) -> Estimate:
+        state = found.state
+        return Estimate(
+            t_ns=state.t_ns,
+            p_BinW=frozen_array(state.p_BinW),
+            R_BtoW=frozen_array(state.R_BtoW),
+            v_BinW=frozen_array(state.v_BinW),
+            w_BinB=frozen_array(state.w_BinB),
+            covariance=frozen_array(state.P),
+            state=self._track,
+            reset_counter=self._resets,
+            nis=found.nis,
+            nis_dof=found.dof,
+            available_ns=available_ns,
+            stages_ns=MappingProxyType(stages),
+        )
+
+
+def _late(frame: Frame) -> Rejected:
+    return Rejected(Reason.LATE, "older than the filter remembers", frame.t_ns, frame.camera)

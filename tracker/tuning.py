@@ -1,0 +1,27 @@
+"""What the tracker is told of the vehicle, the room and itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tracker.state import Process
+
+
+@dataclass(frozen=True, slots=True)
+class Tuning:
+    """Limits of the tracker; none belongs to a recording.
+
+    process: how the vehicle may manoeuvre.
+    gate_probability: of a true sighting to pass each chi-square gate.
+    pixel_noise_floor_px: one sigma of what the ball's model leaves unexplained.
+    sync_window_ns: frames this close in time are one instant.
+    coast_limit_ns: without a sighting for longer the track is lost.
+    continuity_limit_ns: a track lost for longer cannot claim to be the same on return, whatever its prediction says.
+    """
+
+    process: Process
+    gate_probability: float
+    pixel_noise_floor_px: float
+    sync_window_ns: int
+    coast_limit_ns: int
+    continuity_limit_ns: int
