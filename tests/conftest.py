@@ -1,0 +1,37 @@
+"""What many tests need: the recordings."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+REPOSITORY = Path(__file__).resolve().parent.parent
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """Return the folder of recordings: POSEBRIDGE_SHARED, or `shared` beside the repository.
+
+    In CI a missing folder is a failure; on a user's machine the tests that need it are skipped.
+    """
+    folder = Path(os.environ.get("POSEBRIDGE_SHARED", REPOSITORY.parent / "shared"))
+    if not (folder / "recordings").is_dir():
+        missing = f"no recordings in {folder}: set POSEBRIDGE_SHARED to the folder that holds `recordings`"
+        if os.environ.get("CI") == "true":
+            pytest.fail(missing)
+        pytest.skip(missing)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def lab_protocol(shared: Path) -> Path:
+    """Return the recording of the paper's protocol: 38 pairs, PNG."""
+    return shared / "recordings" / "lab-protocol"
+
+
+@pytest.fixture(scope="session")
+def lab_flight(shared: Path) -> Path:
+    """Return the recording of a flight: 90 pairs at 15 Hz, JPEG, motion blur, balls partly hidden."""
+    return shared / "recordings" / "lab-flight"
