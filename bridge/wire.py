@@ -1,0 +1,72 @@
+"""Values on their way over a link, and the record of what went."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+FieldValue = int | float | str | list[float] | list[int]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Message:
+    """One MAVLink message that still waits for its sequence number.
+
+    name: its MAVLink name.  t_ns: stream time it speaks of [ns].
+    available_ns: stopwatch reading when the newest frame behind it stood in memory, 0 for none [ns].
+    fields: its fields by MAVLink name; floats are already rounded to the 32 bits that go on the wire.
+    """
+
+    name: str
+    t_ns: int
+    available_ns: int
+    fields: Mapping[str, FieldValue]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sent:
+    """One MAVLink message that a link's kernel buffer took.
+
+    link: the link's URI.  message: its MAVLink name.
+    t_ns: stream time it speaks of: the estimate's, or the clock's for a heartbeat [ns].
+    sent_ns: stopwatch reading after the write [ns].
+    available_ns: stopwatch reading when the newest frame behind it stood in memory, 0 for none [ns].
+    raw: the whole MAVLink 2 frame.  fields: its decoded fields by MAVLink name.
+    """
+
+    link: str
+    message: str
+    t_ns: int
+    sent_ns: int
+    available_ns: int
+    raw: bytes
+    fields: Mapping[str, FieldValue]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Received:
+    """One MAVLink message that came in whole, with the right checksum. message: its MAVLink name."""
+
+    message: str
+    system_id: int
+    component_id: int
+    sequence: int
+    fields: Mapping[str, FieldValue]
+    raw: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class LinkState:
+    """How one link fares.
+
+    name: the link's URI.  up: nothing is known to be wrong with it.  reason: why it is down, empty when up.
+    sent: messages the kernel took.  dropped: messages that could not go, or that came back refused.
+    superseded: messages a newer one of the same name replaced before they could go.
+    """
+
+    name: str
+    up: bool
+    reason: str
+    sent: int
+    dropped: int
+    superseded: int
