@@ -1,0 +1,138 @@
+"""One step of the loop, as it waits for the log, and the JSON values it turns into."""
+
+from __future__ import annotations
+
+import base64
+from typing import Any, NamedTuple
+
+import orjson
+
+from bridge.log import triangle
+from bridge.wire import Sent
+from tracker import so3
+from tracker.types import BallSighting, Estimate, Event, Frame, Rejected, Step
+
+Value = dict[str, Any]
+
+
+class FrameTime(NamedTuple):
+    """What the log keeps of a frame: all but its image, which must not wait in the queue."""
+
+    camera: int
+    t_ns: int
+    available_ns: int
+
+
+class Entry(NamedTuple):
+    """One step and what was sent for it.
+
+    now_ns: stream time when it was taken [ns].  wall_ns: the wall clock then, where one is due [ns].
+    """
+
+    now_ns: int
+    wall_ns: int | None
+    frame: FrameTime | None
+    rejections: tuple[Rejected, ...]
+    step: Step
+    sent: tuple[Sent, ...]
+
+
+def make_entry(event: Event | None, step: Step, sent: tuple[Sent, ...], now_ns: int, wall_ns: int | None) -> Entry:
+    """Keep what the log needs of one turn of the loop."""
+    frame = FrameTime(event.camera, event.t_ns, event.available_ns) if isinstance(event, Frame) else None
+    rejections = step.rejections
+    if isinstance(event, Rejected) and event not in rejections:
+        rejections = (event, *rejections)
+    return Entry(now_ns, wall_ns, frame, rejections, step, sent)
+
+
+def encode(value: Value) -> bytes:
+    """Return a value as JSON; numbers that are not finite, which JSON cannot hold, become null."""
+    return orjson.dumps(value, option=orjson.OPT_SERIALIZE_NUMPY)
+
+
+def estimate_value(estimate: Estimate, q_BtoW: list[float]) -> Value:
+    """Return the `/estimate` message of an estimate whose quaternion (w, x, y, z) is at hand."""
+    return {
+        "t_ns": estimate.t_ns,
+        "state": estimate.state.value,
+        "reset_counter": estimate.reset_counter,
+        "p_BinW_m": estimate.p_BinW.tolist(),
+        "q_BtoW": q_BtoW,
+        "v_BinW_m_s": estimate.v_BinW.tolist(),
+        "w_BinB_rad_s": estimate.w_BinB.tolist(),
+        "covariance": triangle.pack(estimate.covariance),
+        "nis": float(estimate.nis),
+        "nis_dof": estimate.nis_dof,
+        "available_ns": estimate.available_ns,
+    }
+
+
+def quaternion(estimate: Estimate) -> list[float]:
+    """Return the estimate's attitude as w, x, y, z."""
+    values: list[float] = so3.quaternion(estimate.R_BtoW).tolist()
+    return values
+
+
+def latency_value(estimate: Estimate, sent: tuple[Sent, ...]) -> Value:
+    """Return the `/latency` message of an estimate and all that was sent with it."""
+    links: dict[str, int] = {}
+    for one in sent:
+        if one.t_ns == estimate.t_ns and one.available_ns:
+            links[one.link] = max(links.get(one.link, 0), one.sent_ns - one.available_ns)
+    return {
+        "t_ns": estimate.t_ns,
+        "stages": [{"name": name, "duration_ns": took} for name, took in estimate.stages_ns.items()],
+        "links": [{"link": link, "latency_ns": latency} for link, latency in links.items()],
+    }
+
+
+def sightings_value(frame: FrameTime, sightings: tuple[BallSighting, ...]) -> Value:
+    """Return the `/sightings` message of one frame."""
+    return {
+        "camera": frame.camera,
+        "t_ns": frame.t_ns,
+        "available_ns": frame.available_ns,
+        "sightings": [_sighting_value(sighting) for sighting in sightings],
+    }
+
+
+def _sighting_value(sighting: BallSighting) -> Value:
+    u, v = sighting.uv_px.tolist()
+    (uu, uv), (_, vv) = sighting.cov_px.tolist()
+    return {
+        "camera": sighting.camera,
+        "ball": sighting.ball,
+        "t_ns": sighting.t_ns,
+        "u_px": u,
+        "v_px": v,
+        "cov_px2": [uu, uv, vv],
+    }
+
+
+def rejections_value(rejections: tuple[Rejected, ...]) -> Value:
+    """Return the `/rejections` message of one step."""
+    return {
+        "rejections": [
+            {
+                "reason": rejected.reason.value,
+                "detail": rejected.detail,
+                "t_ns": rejected.t_ns,
+                "camera": -1 if rejected.camera is None else rejected.camera,
+            }
+            for rejected in rejections
+        ]
+    }
+
+
+def sent_value(sent: Sent) -> Value:
+    """Return the `/mavlink/sent/...` message of one MAVLink message."""
+    return {
+        "link": sent.link,
+        "t_ns": sent.t_ns,
+        "sent_ns": sent.sent_ns,
+        "available_ns": sent.available_ns,
+        "latency_ns": sent.sent_ns - sent.available_ns if sent.available_ns else -1,
+        "raw": base64.b64encode(sent.raw).decode(),
+        "fields": dict(sent.fields),
+    }

@@ -1,0 +1,202 @@
+"""Write the log: entries in, MCAP out."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from io import BufferedWriter
+from pathlib import PurePath
+from typing import Any, Protocol
+
+from foxglove_schemas_protobuf.Log_pb2 import Log
+from mcap.writer import CompressionType, Writer
+
+from bridge.log import entry as values
+from bridge.log import scene, topics
+from bridge.log.entry import Entry, encode
+from bridge.wire import Sent
+from tracker.camera import Camera
+from tracker.rig import Marker
+from tracker.types import Estimate, TrackState
+
+CHUNK_BYTES = 32 * 1024
+CALIBRATION_ATTACHMENT = "calibration.json"
+_MEDIA_TYPES = {
+    ".toml": "application/toml",
+    ".json": "application/json",
+    ".yaml": "application/yaml",
+    ".txt": "text/plain",
+}
+
+
+class McapWriter(Protocol):
+    """What is used of mcap's writer after its beginning; the library leaves these two without types."""
+
+    def flush(self) -> None:
+        """End the chunk and hand everything to the kernel."""
+
+    def finish(self) -> None:
+        """Write index and footer."""
+
+
+@dataclass(frozen=True, slots=True)
+class Cover:
+    """What stands at the front of a log, readable however early the recorder was killed.
+
+    attachments: whole files by name, such as the config as used.
+    metadata: names and values by topic, such as versions, source URI and command line.
+    made_ns: wall clock at the beginning [ns].
+    """
+
+    attachments: Mapping[str, bytes]
+    metadata: Mapping[str, Mapping[str, str]]
+    cameras: tuple[Camera, ...]
+    marker: Marker
+    made_ns: int
+
+
+class Channel:
+    """One topic of an open file."""
+
+    def __init__(self, writer: Writer, topic: topics.Topic) -> None:
+        schema_id = writer.register_schema(topic.schema_name, topic.schema_encoding, topic.schema)
+        self._id = writer.register_channel(topic.name, topic.message_encoding, schema_id)
+        self._writer = writer
+        self._sequence = 0
+
+    def put(self, data: bytes, log_ns: int, publish_ns: int) -> None:
+        """Append a message; MCAP knows no time before 0, so the file's own stamps stop there."""
+        self._writer.add_message(self._id, max(log_ns, 0), data, max(publish_ns, 0), self._sequence)
+        self._sequence += 1
+
+
+class LogWriter:
+    """Write a log to a stream that it then owns. For one thread.
+
+    Raises:
+        OSError: from every method, whatever the stream raises.
+    """
+
+    def __init__(self, stream: BufferedWriter, cover: Cover) -> None:
+        self._stream = stream
+        self._writer = Writer(stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
+        self._ending: McapWriter = self._writer
+        self._cover = cover
+        self._channels: dict[str, Channel] = {}
+        self._state: TrackState | None = None
+        self._reset_counter: int | None = None
+        self._begin()
+
+    def write(self, entry: Entry) -> None:
+        """Append one step."""
+        if topics.CAMERA_TF.name not in self._channels:
+            self._write_scene(entry.now_ns)
+        now_ns = entry.now_ns
+        if entry.wall_ns is not None:
+            self._json(topics.CLOCK, {"stream_ns": now_ns, "wall_ns": entry.wall_ns}, now_ns, now_ns)
+        if entry.frame is not None:
+            value = values.sightings_value(entry.frame, entry.step.sightings)
+            self._json(topics.SIGHTINGS, value, now_ns, entry.frame.t_ns)
+        if entry.rejections:
+            self._json(topics.REJECTIONS, values.rejections_value(entry.rejections), now_ns, now_ns)
+        for estimate in entry.step.estimates:
+            self._write_estimate(estimate, entry.sent, now_ns)
+        for sent in entry.sent:
+            self._write_sent(sent, now_ns)
+        self._write_changes(entry)
+
+    def warn(self, now_ns: int, message: str) -> None:
+        """Leave a warning of the recorder's own in the log panel."""
+        self._remark(now_ns, now_ns, Log.WARNING, "recorder", message)
+
+    def flush(self) -> None:
+        """Hand everything written so far to the kernel: from here a kill of this process loses none of it."""
+        self._ending.flush()
+
+    def finish(self, metadata: Mapping[str, str]) -> None:
+        """Write the last metadata, the index and the footer, and close the stream."""
+        self._ending.flush()
+        self._writer.add_metadata("recorder", dict(metadata))
+        self._ending.finish()
+        self._stream.close()
+
+    def _begin(self) -> None:
+        self._writer.start()
+        for name, entries in self._cover.metadata.items():
+            self._writer.add_metadata(name, dict(entries))
+        drawn = {CALIBRATION_ATTACHMENT: _calibration(self._cover.cameras, self._cover.marker)}
+        for name, data in (drawn | dict(self._cover.attachments)).items():
+            media_type = _MEDIA_TYPES.get(PurePath(name).suffix, "application/octet-stream")
+            self._writer.add_attachment(self._cover.made_ns, 0, name, media_type, data)
+        self._ending.flush()
+
+    def _write_scene(self, now_ns: int) -> None:
+        for topic in topics.FIXED:
+            self._channels[topic.name] = Channel(self._writer, topic)
+        self._protobuf(topics.CAMERA_TF, scene.camera_transforms(self._cover.cameras), now_ns, now_ns)
+        self._protobuf(topics.MARKER, scene.marker_scene(self._cover.marker), now_ns, now_ns)
+        for camera in self._cover.cameras:
+            self._protobuf(topics.calibration_topic(camera.name), scene.calibration(camera), now_ns, now_ns)
+
+    def _write_estimate(self, estimate: Estimate, sent: tuple[Sent, ...], now_ns: int) -> None:
+        t_ns, q_BtoW = estimate.t_ns, values.quaternion(estimate)
+        value = values.estimate_value(estimate, q_BtoW)
+        p_BinW = value["p_BinW_m"]
+        self._json(topics.ESTIMATE, value, now_ns, t_ns)
+        self._protobuf(topics.POSE, scene.vehicle_pose(t_ns, p_BinW, q_BtoW), now_ns, t_ns)
+        self._protobuf(topics.VEHICLE_TF, scene.vehicle_transform(t_ns, p_BinW, q_BtoW), now_ns, t_ns)
+        self._json(topics.LATENCY, values.latency_value(estimate, sent), now_ns, t_ns)
+        if self._reset_counter is not None and estimate.reset_counter != self._reset_counter:
+            message = f"the estimate jumped: reset_counter {self._reset_counter} -> {estimate.reset_counter}"
+            self._remark(now_ns, t_ns, Log.WARNING, "tracker", message)
+        self._reset_counter = estimate.reset_counter
+
+    def _write_sent(self, sent: Sent, now_ns: int) -> None:
+        name = topics.SENT_PREFIX + sent.message
+        if name not in self._channels:
+            self._channels[name] = Channel(self._writer, topics.sent_topic(sent.message, sent.fields))
+        self._channels[name].put(encode(values.sent_value(sent)), now_ns, sent.t_ns)
+
+    def _write_changes(self, entry: Entry) -> None:
+        state = entry.step.state
+        if state is not self._state:
+            before = "" if self._state is None else f"{self._state.value} -> "
+            level = Log.WARNING if state is TrackState.LOST else Log.INFO
+            self._remark(entry.now_ns, entry.now_ns, level, "tracker", before + state.value)
+            self._state = state
+
+    def _remark(self, now_ns: int, t_ns: int, level: Log.Level.ValueType, name: str, message: str) -> None:
+        self._protobuf(topics.LOG, scene.remark(t_ns, level, name, message), now_ns, t_ns)
+
+    def _json(self, topic: topics.Topic, value: dict[str, Any], now_ns: int, t_ns: int) -> None:
+        self._channel(topic).put(encode(value), now_ns, t_ns)
+
+    def _protobuf(self, topic: topics.Topic, message: Any, now_ns: int, t_ns: int) -> None:
+        self._channel(topic).put(message.SerializeToString(), now_ns, t_ns)
+
+    def _channel(self, topic: topics.Topic) -> Channel:
+        if topic.name not in self._channels:
+            self._channels[topic.name] = Channel(self._writer, topic)
+        return self._channels[topic.name]
+
+
+def _calibration(cameras: tuple[Camera, ...], marker: Marker) -> bytes:
+    """Return cameras and marker as JSON text: what the tracker really used, whatever files it came from."""
+    content = {
+        "cameras": [
+            {
+                "name": camera.name,
+                "resolution_px": [camera.width_px, camera.height_px],
+                "K_px": camera.K.tolist(),
+                "distortion": camera.distortion.tolist(),
+                "R_CtoW": camera.R_CtoW.tolist(),
+                "p_CinW_m": camera.p_CinW.tolist(),
+            }
+            for camera in cameras
+        ],
+        "marker": [
+            {"name": ball.name, "p_inB_m": ball.p_inB.tolist(), "radius_m": ball.radius_m} for ball in marker.balls
+        ],
+    }
+    return json.dumps(content, indent=1).encode()

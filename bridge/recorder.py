@@ -1,0 +1,201 @@
+"""Record the flight without ever delaying it."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+from bridge.log.entry import Entry, make_entry
+from bridge.log.stream import open_stream
+from bridge.log.writer import Cover, LogWriter
+from bridge.wire import Sent
+from tracker.camera import Camera
+from tracker.rig import Marker
+from tracker.types import Event, Step
+
+FLUSH_S = 0.5  # an entry waits for the next one's flush or for the timeout, one after the other: under 1 s together
+FLUSH_NS = 500_000_000
+CLOCK_NS = 1_000_000_000
+CAPACITY = 1024
+CLOSE_S = 10.0
+_CLOSE = None  # the queue's last item
+
+
+@dataclass(frozen=True, slots=True)
+class RecorderState:
+    """How the recording stands.
+
+    written: steps handed to the kernel.  dropped: steps that are not in the log and never will be.
+    size_bytes: of the log.  error: why recording stopped, in one line; None while all is well.
+    """
+
+    written: int
+    dropped: int
+    size_bytes: int
+    error: str | None
+
+
+class Recorder:
+    """Write every step to an MCAP file from a thread of its own.
+
+    `take` only puts the step on a bounded queue. Where the disk is slower than the flight, steps are dropped and
+    counted; where it fails, recording stops, `state` says why, and the flight goes on.
+
+    Args:
+        path: a new file; or a pipe or device, written as it is.
+        attachments: whole files by name, such as the config as used.
+        metadata: names and values by topic, such as versions, source URI and command line.
+        cameras, marker: as tracked with, drawn into the log.
+        wall_clock: reads the wall clock [ns since 1970]; noted once a second beside stream time.
+        overwrite: replace a file that exists.
+        block_when_full: wait for the disk instead of dropping, for input that is not live.
+        capacity: steps the queue holds; 1024 are some 17 s of two cameras at 30 Hz.
+    Raises:
+        OperatorError: the file exists, or the path cannot be opened.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        *,
+        attachments: Mapping[str, bytes],
+        metadata: Mapping[str, Mapping[str, str]],
+        cameras: tuple[Camera, ...],
+        marker: Marker,
+        wall_clock: Callable[[], int],
+        overwrite: bool = False,
+        block_when_full: bool = False,
+        capacity: int = CAPACITY,
+    ) -> None:
+        self._path = path
+        self._wall_clock = wall_clock
+        self._block = block_when_full
+        self._stream = open_stream(path, overwrite)
+        self._cover = Cover(attachments, metadata, cameras, marker, wall_clock())
+        self._queue: queue.Queue[Entry | None] = queue.Queue(capacity)
+        self._clock_due_ns: int | None = None
+        self._closed = False
+        self._error: str | None = None
+        self._refused = 0  # counted by the loop's thread, the next three by the writing one
+        self._lost = 0
+        self._pending = 0
+        self._written = 0
+        self._writer = self._begin()
+        self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
+        self._thread.start()
+
+    def take(self, event: Event | None, step: Step, sent: tuple[Sent, ...], now_ns: int) -> None:
+        """Queue one turn of the loop at stream time `now_ns` [ns]; returns at once unless `block_when_full`.
+
+        event: None at the end of all events.
+        """
+        entry = make_entry(event, step, sent, now_ns, self._wall_time_if_due(now_ns))
+        if self._closed or not self._put(entry):
+            self._refused += 1
+
+    def state(self) -> RecorderState:
+        """Say how the recording stands."""
+        error = self._error
+        if error is None and not self._closed and not self._thread.is_alive():
+            error = f"log {self._path}: the recorder's thread is gone, which is a bug; its traceback is on stderr"
+        return RecorderState(self._written, self._refused + self._lost, self._stream.size_bytes, error)
+
+    def close(self) -> None:
+        """Write what is queued, end the file properly and wait for it, at most 20 s. A second call does nothing."""
+        if self._closed:
+            return
+        self._closed = True
+        with suppress(queue.Full):
+            self._queue.put(_CLOSE, timeout=CLOSE_S)
+        self._thread.join(CLOSE_S)
+        if self._thread.is_alive():
+            waiting = self._pending + self._queue.qsize()
+            self._error = f"log {self._path}: the disk did not take the last {waiting} steps; the log has no end"
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _wall_time_if_due(self, now_ns: int) -> int | None:
+        if self._clock_due_ns is not None and now_ns < self._clock_due_ns:
+            return None
+        self._clock_due_ns = now_ns + CLOCK_NS
+        return self._wall_clock()
+
+    def _put(self, entry: Entry) -> bool:
+        """Queue an entry; say whether it went in."""
+        while True:
+            try:
+                self._queue.put(entry, block=self._block, timeout=FLUSH_S)
+            except queue.Full:
+                if self._block and self._thread.is_alive():
+                    continue
+                return False
+            return True
+
+    def _begin(self) -> LogWriter | None:
+        try:
+            return LogWriter(self._stream, self._cover)
+        except OSError as error:
+            self._stop(error)
+            return None
+
+    def _run(self) -> None:
+        if self._writer is not None:
+            try:
+                self._record(self._writer)
+            except OSError as error:
+                self._stop(error)
+        if self._error is not None:
+            self._discard()
+
+    def _record(self, writer: LogWriter) -> None:
+        """Write entries until the last."""
+        flushed_ns: int | None = None
+        warned = 0
+        while True:
+            try:
+                entry = self._queue.get(timeout=FLUSH_S)
+            except queue.Empty:
+                self._flush(writer)
+                continue
+            if entry is _CLOSE:
+                break
+            self._pending += 1
+            writer.write(entry)
+            if self._refused > warned:
+                writer.warn(entry.now_ns, f"{self._refused - warned} steps dropped: the disk is too slow")
+                warned = self._refused
+            if flushed_ns is None or abs(entry.now_ns - flushed_ns) >= FLUSH_NS:
+                self._flush(writer)
+                flushed_ns = entry.now_ns
+        self._flush(writer)
+        writer.finish({"steps_written": str(self._written), "steps_dropped": str(self._refused)})
+
+    def _flush(self, writer: LogWriter) -> None:
+        writer.flush()
+        self._written += self._pending
+        self._pending = 0
+
+    def _stop(self, error: OSError) -> None:
+        """Give the recording up, keeping what is on the disk."""
+        self._error = f"log {self._path}: {error.strerror or error}; recording stopped after {self._written} steps"
+        self._lost += self._pending
+        self._pending = 0
+        with suppress(OSError):  # its buffer cannot be written either
+            self._stream.close()
+
+    def _discard(self) -> None:
+        """Empty the queue until the last entry, so that nobody waits for a disk that failed."""
+        while self._queue.get() is not _CLOSE:
+            self._lost += 1
