@@ -1,0 +1,18 @@
+"""The operator's choices: a TOML file, checked, as frozen values."""
+
+from bridge.settings.choose_rig import ChosenRig, RigOrigin, marker_of, rig_of
+from bridge.settings.load import load_settings, shipped_configs
+from bridge.settings.models import DEFAULT_MESSAGES, LinkSettings, Settings, TrackerSettings
+
+__all__ = [
+    "DEFAULT_MESSAGES",
+    "ChosenRig",
+    "LinkSettings",
+    "RigOrigin",
+    "Settings",
+    "TrackerSettings",
+    "load_settings",
+    "marker_of",
+    "rig_of",
+    "shipped_configs",
+]

@@ -1,0 +1,183 @@
+"""What a config may say: one frozen model a section. config/lab.toml explains every key.
+
+Keys carry their unit as a suffix (`_mm`, `_deg`, `_ms`, `_px`, `_m_s2`), which the error messages read back.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, Strict, model_validator
+
+Real = Annotated[float, Strict()]
+Positive = Annotated[float, Strict(), Field(gt=0)]
+NotNegative = Annotated[float, Strict(), Field(ge=0)]
+Share = Annotated[float, Strict(), Field(ge=0, le=1)]
+Pixels = Annotated[int, Strict(), Field(gt=0)]
+Byte = Annotated[int, Strict(), Field(ge=0, le=255)]
+Name = Annotated[str, Field(min_length=1)]
+Triple = Annotated[tuple[Real, ...], Field(min_length=3, max_length=3)]
+Row = Annotated[tuple[Real, ...], Field(min_length=4, max_length=4)]
+
+MessageName = Literal["VISION_POSITION_ESTIMATE", "ATT_POS_MOCAP", "VISION_SPEED_ESTIMATE"]
+DEFAULT_MESSAGES: tuple[MessageName, ...] = ("VISION_POSITION_ESTIMATE", "ATT_POS_MOCAP")
+COLOUR_KEYS = ("hue_deg", "hue_tolerance_deg", "saturation_min", "value_min", "bgr")
+
+
+class Section(BaseModel):
+    """A table of the config: frozen, and no key it does not know."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class RoomSettings(Section):
+    """How the room lies to north."""
+
+    room_yaw_deg: Annotated[float, Strict(), Field(ge=-360, le=360)]
+
+
+class CameraSettings(Section):
+    """One camera's nominal calibration, and how to set a live one up (see `tracker.sources.live_camera`)."""
+
+    name: Name
+    width_px: Pixels
+    height_px: Pixels
+    fx_px: Positive
+    fy_px: Positive
+    cx_px: Real
+    cy_px: Real
+    distortion: Annotated[tuple[Real, ...], Field(min_length=4, max_length=8)]
+    T_CtoW: Annotated[tuple[Row, ...], Field(min_length=4, max_length=4)]
+    frame_rate_hz: Positive | None = None
+    fourcc: Annotated[str, Field(min_length=4, max_length=4)] | None = None
+    exposure_ms: Positive | None = None
+    latency_ms: Annotated[float, Strict(), Field(ge=0, le=1000)] | None = None
+    lock: bool = True
+
+
+class RigSettings(Section):
+    """The cameras: a calibration directory, absolute once loaded, or the nominal ones."""
+
+    calibration: str = ""
+    cameras: tuple[CameraSettings, ...] = ()
+
+    @model_validator(mode="after")
+    def _names_differ(self) -> Self:
+        refuse_twins("camera name", [camera.name for camera in self.cameras])
+        return self
+
+
+class BallSettings(Section):
+    """One painted ball of the marker."""
+
+    name: Name
+    position_mm: Triple
+    radius_mm: Positive
+    hue_deg: Annotated[float, Strict(), Field(ge=0, lt=360)]
+    hue_tolerance_deg: Annotated[float, Strict(), Field(gt=0, le=90)]
+    saturation_min: Share
+    value_min: Share
+    bgr: Annotated[tuple[Byte, ...], Field(min_length=3, max_length=3)]
+
+    @model_validator(mode="before")
+    @classmethod
+    def _has_a_colour(cls, table: object) -> object:
+        lacking = [key for key in COLOUR_KEYS if isinstance(table, Mapping) and key not in table]
+        if lacking:
+            raise ValueError(f"colour missing: the tracker tells balls apart by paint; add {', '.join(lacking)}")
+        return table
+
+
+class MarkerSettings(Section):
+    """The balls on the vehicle."""
+
+    balls: tuple[BallSettings, ...]
+
+    @model_validator(mode="after")
+    def _hues_lie_apart(self) -> Self:
+        refuse_twins("ball name", [ball.name for ball in self.balls])
+        for i, one in enumerate(self.balls):
+            for other in self.balls[i + 1 :]:
+                distance_deg = abs((one.hue_deg - other.hue_deg + 180) % 360 - 180)
+                needed_deg = one.hue_tolerance_deg + other.hue_tolerance_deg
+                if distance_deg < needed_deg:
+                    raise ValueError(
+                        f"hues of {one.name} and {other.name} lie {distance_deg:g} deg apart, their tolerances need "
+                        f"{needed_deg:g} deg; lessen hue_tolerance_deg or repaint one ball"
+                    )
+        return self
+
+
+class ProcessSettings(Section):
+    """How briskly the vehicle may move: the filter's process noise and its first uncertainty."""
+
+    acceleration_m_s2: Positive = 10.0
+    angular_acceleration_rad_s2: Positive = 40.0
+    manoeuvre_ms: Positive = 70.0
+    initial_speed_m_s: Positive = 2.5
+    initial_rate_rad_s: Positive = 1.6
+
+
+class TrackerSettings(Section):
+    """How sightings become estimates."""
+
+    method: Literal["ekf", "paper"] = "ekf"
+    coast_limit_ms: Positive = 200.0
+    continuity_limit_ms: Positive = 1000.0
+    sync_window_ms: NotNegative = 4.0
+    gate_probability: Annotated[float, Strict(), Field(gt=0, lt=1)] = 0.999
+    pixel_noise_floor_px: Positive = 0.1
+    process: ProcessSettings = ProcessSettings()
+
+
+class MavlinkSettings(Section):
+    """Who the bridge is on MAVLink."""
+
+    system_id: Annotated[int, Strict(), Field(ge=1, le=254)] = 1
+    component_id: Annotated[int, Strict(), Field(ge=1, le=255)] = 197
+
+
+class LinkSettings(Section):
+    """One way to an autopilot, and what goes over it at every estimate."""
+
+    uri: Name
+    messages: Annotated[tuple[MessageName, ...], Field(min_length=1)] = DEFAULT_MESSAGES
+
+    @model_validator(mode="after")
+    def _messages_differ(self) -> Self:
+        refuse_twins("message", self.messages)
+        return self
+
+
+class Settings(Section):
+    """A whole config."""
+
+    room: RoomSettings
+    rig: RigSettings
+    marker: MarkerSettings
+    tracker: TrackerSettings = TrackerSettings()
+    mavlink: MavlinkSettings = MavlinkSettings()
+    links: tuple[LinkSettings, ...] = ()
+
+    @model_validator(mode="after")
+    def _links_differ(self) -> Self:
+        refuse_twins("link", [link.uri for link in self.links])
+        return self
+
+    def with_links(self, uris: tuple[str, ...]) -> Settings:
+        """Return these settings with the command line's links, if any, each with the default messages.
+
+        The URIs are checked when the links open, as those of the config are.
+        """
+        if not uris:
+            return self
+        return self.model_copy(update={"links": tuple(LinkSettings.model_construct(uri=uri) for uri in uris)})
+
+
+def refuse_twins(what: str, names: Sequence[str]) -> None:
+    """Raise ValueError when a name comes twice."""
+    twins = [name for name, count in Counter(names).items() if count > 1]
+    if twins:
+        raise ValueError(f"{what} {twins[0]} comes twice; each must differ: rename or remove one")

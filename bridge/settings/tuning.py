@@ -1,0 +1,28 @@
+"""The config's [tracker] section as the tracker takes it."""
+
+from __future__ import annotations
+
+from bridge.settings.models import TrackerSettings
+from tracker.state import Process
+from tracker.tuning import Tuning
+
+NS_PER_MS = 1e6
+
+
+def tuning_of(settings: TrackerSettings) -> Tuning:
+    """Turn milliseconds into nanoseconds and sections into the tracker's own values."""
+    process = settings.process
+    return Tuning(
+        process=Process(
+            acceleration_m_s2=process.acceleration_m_s2,
+            angular_acceleration_rad_s2=process.angular_acceleration_rad_s2,
+            manoeuvre_s=process.manoeuvre_ms * 1e-3,
+            initial_speed_m_s=process.initial_speed_m_s,
+            initial_rate_rad_s=process.initial_rate_rad_s,
+        ),
+        gate_probability=settings.gate_probability,
+        pixel_noise_floor_px=settings.pixel_noise_floor_px,
+        sync_window_ns=round(settings.sync_window_ms * NS_PER_MS),
+        coast_limit_ns=round(settings.coast_limit_ms * NS_PER_MS),
+        continuity_limit_ns=round(settings.continuity_limit_ms * NS_PER_MS),
+    )
