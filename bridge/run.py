@@ -1,0 +1,100 @@
+"""The loop: frames in, poses out, everything logged.
+
+    source -> tracker -> outlet (autopilots) -> monitor, recorder, status line
+
+One thread, no queue between its parts: an estimate is on the wire before anything else is done with it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Protocol
+
+from bridge.clock import Clock
+from bridge.monitor import Monitor
+from bridge.outlet import Outlet
+from bridge.recorder import Recorder
+from bridge.status import Reading, StatusLine
+from bridge.summary import LogSummary, Summary
+from bridge.wire import Sent
+from tracker.types import Event, Rejected, Step
+
+
+class Steps(Protocol):
+    """What turns events into estimates: `tracker.pipeline.Tracker`, or the paper's own method."""
+
+    def step(self, event: Event) -> Step:
+        """Take one event."""
+
+    def finish(self) -> Step:
+        """Give what was still held back when the events ended."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Outlets:
+    """Where a run's results go: the autopilots, the figures, and if wanted the log and the screen."""
+
+    links: Outlet
+    monitor: Monitor
+    recorder: Recorder | None = None
+    status: StatusLine | None = None
+
+    def log_state(self) -> str:
+        """Say in a word or two how the log fares."""
+        if self.recorder is None:
+            return "off"
+        state = self.recorder.state()
+        if state.error is not None:
+            return f"STOPPED: {state.error}"
+        return f"{state.size_bytes / 1e6:.1f} MB" + (f", {state.dropped} steps dropped" if state.dropped else "")
+
+    def summary(self, log_path: str | None) -> Summary:
+        """Return the run's figures; log_path names the log."""
+        log = None
+        if self.recorder is not None and log_path is not None:
+            state = self.recorder.state()
+            log = LogSummary(log_path, state.written, state.dropped, state.error or "")
+        return self.monitor.summary(self.links.link_states(), log)
+
+
+def run(events: Iterable[Event], tracker: Steps, clock: Clock, outlets: Outlets) -> None:
+    """Take every event of a source through tracker and outlets, until there are no more.
+
+    Args:
+        events: frames in the order they are to be worked on.
+        clock: stream time, in the base of the frames' own.
+    """
+    for event in events:
+        if not isinstance(event, Rejected):
+            clock.follow(event)
+        _deliver(event, tracker.step(event), clock, outlets)
+    _deliver(None, tracker.finish(), clock, outlets)
+
+
+def close(clock: Clock, outlets: Outlets) -> None:
+    """Close links and log in order, after a run however it ended; what the links still sent is logged."""
+    last = outlets.links.close()
+    _enter(None, Step(outlets.monitor.state), last, clock.now_ns(), outlets)
+    if outlets.recorder is not None:
+        outlets.recorder.close()
+
+
+def _deliver(event: Event | None, step: Step, clock: Clock, outlets: Outlets) -> None:
+    """Give one step to every outlet, the autopilots first."""
+    now_ns = clock.now_ns()
+    sent = outlets.links.send(step, now_ns)
+    _enter(event, step, sent, now_ns, outlets)
+    if outlets.status is not None:
+        outlets.status.show(now_ns, lambda: _reading(outlets))
+
+
+def _enter(event: Event | None, step: Step, sent: tuple[Sent, ...], now_ns: int, outlets: Outlets) -> None:
+    """Enter one turn into the figures and the log."""
+    outlets.monitor.take(event, step, sent)
+    if outlets.recorder is not None:
+        outlets.recorder.take(event, step, sent, now_ns)
+
+
+def _reading(outlets: Outlets) -> Reading:
+    return outlets.monitor.reading(outlets.links.link_states(), outlets.log_state())

@@ -1,0 +1,155 @@
+"""The command as its user meets it: a process with arguments, two streams and an exit code."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from bridge.settings import shipped_configs
+from tests.bridge.recordings import record, turns
+
+ROOT = Path(__file__).parents[2]
+LAB = shipped_configs()["lab"].read_text(encoding="utf-8")
+
+
+def posebridge(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    """Run the command line in a process of its own."""
+    return subprocess.run(
+        [sys.executable, "-m", "tools", *map(str, arguments)],
+        cwd=ROOT, env=os.environ | {"COLUMNS": "100"}, capture_output=True, text=True, check=False, timeout=60,
+    )  # fmt: skip
+
+
+def refusal(*arguments: str | Path) -> str:
+    """Return the one line on stderr of a command that must be refused with exit code 2 and nothing on stdout."""
+    done = posebridge(*arguments)
+    assert done.returncode == 2, done.stderr
+    assert done.stdout == ""
+    assert done.stderr.endswith("\n")
+    assert done.stderr.count("\n") == 1, done.stderr
+    assert done.stderr.startswith("posebridge: error: ")
+    return done.stderr.removeprefix("posebridge: error: ").rstrip()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "complaint"),
+    [
+        ([], "Missing command"),
+        (["fly"], "No such command 'fly'"),
+        (["run"], "Missing option '--config'"),
+        (["run", "--config"], "Option '--config' requires an argument"),
+        (["run", "--config", "lab", "--sauce", "x"], "No such option: --sauce"),
+        (["run", "--config", "lab", "--pace", "slow"], "Invalid value for '--pace': Value error, 'slow' is not one of"),
+        (["run", "--config", "lab", "more"], "Got unexpected extra argument"),
+        (["demo", "--duration_s", "long"], "Invalid value for '--duration_s'"),
+        (["demo", "--seed", "1.5"], "Invalid value for '--seed'"),
+        (["export"], "Missing argument 'log'"),
+        (["export", "a.mcap"], "Missing option '--format'"),
+        (["export", "a.mcap", "--format", "xls"], "Invalid value for '--format': Value error, 'xls' is not one of"),
+    ],
+)  # fmt: skip
+def test_wrong_usage_is_one_line_that_points_to_the_help(arguments: list[str], complaint: str) -> None:
+    line = refusal(*arguments)
+    assert complaint in line
+    assert line.endswith("; see `posebridge --help`")
+
+
+@pytest.mark.parametrize("duration_s", ["0", "-3", "nan", "inf", "1e9"])
+def test_a_demo_of_no_sensible_length_is_refused(duration_s: str) -> None:
+    assert "s must be 1 to 3600 s" in refusal("demo", f"--duration_s={duration_s}")
+
+
+def test_a_demo_with_a_negative_seed_is_refused() -> None:
+    assert refusal("demo", "--seed=-1") == "--seed: -1 must be 0 or more; give another number"
+
+
+def test_a_missing_config_lists_the_shipped_ones() -> None:
+    assert refusal("run", "--config", "nowhere") == (
+        "config nowhere: cannot be read (No such file or directory); shipped configs: lab; or give a path to a .toml"
+    )
+
+
+def test_an_unknown_key_of_a_config_names_the_known_ones(tmp_path: Path) -> None:
+    config = tmp_path / "room.toml"
+    config.write_text(LAB.replace("coast_limit_ms", "coast_ms", 1), encoding="utf-8")
+    line = refusal("run", "--config", config)
+    assert line.startswith(f"config {config}: [tracker] unknown key coast_ms; ")
+    assert "known keys: method, coast_limit_ms" in line
+
+
+def test_a_config_that_is_no_toml_names_the_line(tmp_path: Path) -> None:
+    config = tmp_path / "room.toml"
+    config.write_text("[room]\nroom_yaw_deg == 3\n", encoding="utf-8")
+    assert "line 2" in refusal("run", "--config", config)
+
+
+def test_a_log_that_is_not_there_cannot_be_exported(tmp_path: Path) -> None:
+    assert "gone.mcap" in refusal("export", tmp_path / "gone.mcap", "--format", "tum")
+
+
+def test_a_table_goes_beside_the_log_or_to_stdout(tmp_path: Path) -> None:
+    log = tmp_path / "flight.mcap"
+    record(log, turns(20))
+    beside = posebridge("export", log, "--format", "tum")
+    table = (tmp_path / "flight.tum").read_text(encoding="ascii")
+    assert (beside.returncode, beside.stdout) == (0, "")
+    assert beside.stderr == f"{len(table.splitlines())} estimates written to {tmp_path / 'flight.tum'}\n"
+    to_stdout = posebridge("export", log, "--format", "tum", "--out", "-")
+    assert (to_stdout.returncode, to_stdout.stdout, to_stdout.stderr) == (0, table, "")
+
+
+def test_a_reader_who_leaves_early_is_no_traceback(tmp_path: Path) -> None:
+    log = tmp_path / "flight.mcap"
+    record(log, turns(2000))  # more than a pipe holds
+    command = f"{shlex.join([sys.executable, '-m', 'tools', 'export', str(log)])} --format csv --out - | head -1"
+    done = subprocess.run(["bash", "-c", command], cwd=ROOT, capture_output=True, text=True, check=False, timeout=60)
+    assert done.stdout.startswith("t_ns,")
+    assert done.stderr == ""
+
+
+def test_help_lists_every_command() -> None:
+    done = posebridge("--help")
+    assert done.returncode == 0
+    assert all(command in done.stdout for command in ("run", "demo", "export", "--version"))
+
+
+def test_version_is_one_line() -> None:
+    done = posebridge("--version")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("posebridge ")
+    assert done.stdout.count("\n") == 1
+
+
+def test_help_loads_neither_images_nor_links() -> None:
+    heavy = "{'cv2', 'pymavlink', 'pydantic', 'scipy', 'mcap'}"
+    code = f"import sys, tools.cli; sys.exit(bool({heavy} & set(sys.modules)))"
+    assert subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=False, timeout=60).returncode == 0
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_ends_a_command_in_order_with_130_however_often_it_comes(number: signal.Signals) -> None:
+    """A command that waits stands for `run`: its `finally` is where log and links are closed."""
+    code = """
+import os, signal, sys
+from tools import cli
+@cli.app.command()
+def wait():
+    try:
+        os.kill(os.getpid(), int(sys.argv[1]))
+        signal.pause()
+    finally:
+        os.kill(os.getpid(), int(sys.argv[1]))
+        print("closed", flush=True)
+sys.exit(cli.run_command_line(["wait"]))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code, str(int(number))],
+        cwd=ROOT, capture_output=True, text=True, check=False, timeout=60,
+    )  # fmt: skip
+    assert (done.returncode, done.stdout, done.stderr) == (130, "closed\n", "")

@@ -1,0 +1,165 @@
+"""The command line `posebridge`, and the only place that takes the real clock."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import signal
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from types import FrameType
+from typing import Annotated
+
+import typer
+
+from tools.request import Clocks, DemoRequest, ExportFormat, Pace, RunRequest
+from tracker.errors import OperatorError
+
+EXIT_OPERATOR = 2
+EXIT_INTERRUPTED = 130
+STDOUT = Path("-")
+
+app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+
+# Commands import what they need when they run, so that `--help` and a mistyped option answer at once.
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and exit: 0 done, 2 something the operator can mend, 130 interrupted."""
+    sys.exit(run_command_line(sys.argv[1:] if arguments is None else arguments))
+
+
+def run_command_line(arguments: Sequence[str]) -> int:
+    """Run one command and return its exit code; what the operator can mend is one line on stderr."""
+    _interrupt_once()
+    try:
+        return int(app(list(arguments), prog_name="posebridge", standalone_mode=False) or 0)
+    except typer.TyperException as error:
+        return _refuse(f"{error.format_message().rstrip('.')}; see `posebridge --help`")
+    except OperatorError as error:
+        return _refuse(str(error))
+    except KeyboardInterrupt:  # before the command began; within it, typer itself returns 130
+        return EXIT_INTERRUPTED
+
+
+def _refuse(message: str) -> int:
+    sys.stderr.write(f"posebridge: error: {' '.join(message.split())}\n")
+    return EXIT_OPERATOR
+
+
+def _interrupt_once() -> None:
+    """Let the first SIGINT or SIGTERM end the run in order, as a KeyboardInterrupt, and later ones pass.
+
+    `timeout`, and Ctrl-C through `make`, may signal twice: the second must not spoil the closing of the log.
+    """
+
+    def interrupt(_number: int, _frame: FrameType | None) -> None:
+        for each in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(each, signal.SIG_IGN)
+        raise KeyboardInterrupt
+
+    for each in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(each, interrupt)
+
+
+def _clocks() -> Clocks:
+    return Clocks(monotonic=time.monotonic_ns, stopwatch=time.perf_counter_ns, wall=time.time_ns, sleep_s=time.sleep)
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        try:
+            version = importlib.metadata.version("posebridge")
+        except importlib.metadata.PackageNotFoundError:
+            version = "(a checkout that is not installed)"
+        typer.echo(f"posebridge {version}")
+        raise typer.Exit
+
+
+@app.callback()
+def posebridge(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version and exit.", is_eager=True, callback=_print_version)
+    ] = False,
+) -> None:
+    """Cameras watch coloured balls on a vehicle; its autopilot gets its pose over MAVLink.
+
+    Exit code 0: done. 2: something you can mend, told in one line. 130: interrupted, links and log closed in order.
+    """
+
+
+@app.command()
+def run(
+    config: Annotated[str, typer.Option(help="A shipped config by name, or a path to a .toml.")] = "lab",
+    source: Annotated[
+        str, typer.Option(help="recording:DIR, video:A.mp4,B.mp4, camera:0,1 or sim:NAME.", metavar="URI")
+    ] = "camera:0,1",
+    link: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="udpout:HOST:PORT, udpin:HOST:PORT, serial:DEVICE:BAUD or tcp:HOST:PORT, once for each link. "
+            "Replaces the config's links.",
+            metavar="URI",
+        ),
+    ] = None,
+    log: Annotated[Path | None, typer.Option(help="Record everything in this MCAP file.", metavar="FILE")] = None,
+    pace: Annotated[
+        Pace, typer.Option(help="real: as recorded. fast: as fast as it goes, same input, same bytes. Live is real.")
+    ] = Pace.REAL,
+    summary: Annotated[Path | None, typer.Option(help="Write the run's figures here.", metavar="FILE.json")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a log that exists.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Show no status line and no summary.")] = False,
+) -> None:
+    """Track the vehicle and send its pose to the autopilot; Ctrl-C ends it."""
+    from bridge.settings import load_settings
+
+    settings = load_settings(config).with_links(tuple(link or ()))
+    request = RunRequest(settings, source, log, pace, summary, overwrite, quiet)
+
+    from tools.session import run_session
+
+    run_session(request, _clocks())
+
+
+@app.command()
+def demo(
+    duration_s: Annotated[
+        float, typer.Option("--duration_s", "--duration-s", help="Length of the flight [s].", metavar="S")
+    ] = 60.0,
+    seed: Annotated[int, typer.Option(help="Same seed, same flight, same noise.", metavar="N")] = 1,
+    out: Annotated[Path, typer.Option(help="Folder for the log and the summary.", metavar="DIR")] = Path("logs/demo"),
+    pace: Annotated[Pace, typer.Option(help="real: watch it fly. fast: as fast as it goes.")] = Pace.REAL,
+) -> None:
+    """Fly a simulated helicopter on simulated cameras, closed loop, with nothing attached."""
+    request = DemoRequest(duration_s, seed, out, pace)
+
+    from tools.demo import run_demo
+
+    run_demo(request, _clocks())
+
+
+@app.command()
+def export(
+    log: Annotated[Path, typer.Argument(help="A log that `run` or `demo` wrote.")],
+    format_: Annotated[ExportFormat, typer.Option("--format", help="tum: time and pose. csv: every column.")],
+    out: Annotated[
+        Path | None, typer.Option(help="File to write, - for stdout; else beside the log.", metavar="FILE")
+    ] = None,
+) -> None:
+    """Write a log's estimates as a table."""
+    from tools.export import export as write_table
+
+    if out == STDOUT:
+        with tempfile.TemporaryDirectory() as folder:
+            table = Path(folder) / "table"
+            report = write_table(log, format_, table)
+            sys.stdout.write(table.read_text(encoding="utf-8"))
+            sys.stdout.flush()  # here, so that a reader who left, as `head` does, is noticed in time
+    else:
+        out = out or log.with_suffix(f".{format_}")
+        report = write_table(log, format_, out)
+        typer.echo(f"{report.count} estimates written to {out}", err=True)
+    for loss in report.lost:
+        typer.echo(f"posebridge: warning: {log}: {loss}", err=True)

@@ -1,0 +1,102 @@
+"""A source URI of the command line, opened, with the rig it is to be seen by."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from bridge.settings import ChosenRig, Settings, rig_of
+from bridge.settings.models import CameraSettings
+from tools.request import Clocks
+from tracker.errors import OperatorError
+from tracker.sources.live import LiveSource
+from tracker.sources.live_camera import LiveCamera
+from tracker.sources.protocol import Source
+from tracker.sources.recording import RecordingSource
+from tracker.sources.uri import EXAMPLES, SourceKind, SourceUri, parse_source
+from tracker.sources.video import VideoSource
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OpenedSource:
+    """A source and its rig.
+
+    live: its frames come by themselves, in the host's monotonic time; `--pace` does not apply.
+    warnings: one line each for what the operator should know but need not mend.
+    """
+
+    source: Source
+    chosen: ChosenRig
+    live: bool
+    warnings: tuple[str, ...] = ()
+
+
+def open_source(text: str, settings: Settings, clocks: Clocks) -> OpenedSource:
+    """Open what a source URI names and choose the rig for it.
+
+    Raises:
+        OperatorError: not a source, not there, or with cameras other than the rig's.
+    """
+    uri = parse_source(text)
+    if uri.kind not in _OPENERS:
+        known = ", ".join(EXAMPLES[kind] for kind in _OPENERS)
+        raise OperatorError(f"source {text}: `run` cannot read {uri.kind}: sources; give one of {known}")
+    return _OPENERS[uri.kind](uri, settings, clocks)
+
+
+def _open_recording(uri: SourceUri, settings: Settings, clocks: Clocks) -> OpenedSource:
+    source = RecordingSource(Path(uri.argument), clocks.stopwatch)
+    return OpenedSource(source, rig_of(settings, source.cameras, source.camera_count), live=False)
+
+
+def _open_video(uri: SourceUri, settings: Settings, clocks: Clocks) -> OpenedSource:
+    chosen = rig_of(settings, None, len(uri.items))
+    paths = tuple(Path(item) for item in uri.items)
+    return OpenedSource(
+        VideoSource(paths, clocks.stopwatch, expected=chosen.rig.cameras), chosen, False, _doubts(chosen)
+    )
+
+
+def _open_cameras(uri: SourceUri, settings: Settings, clocks: Clocks) -> OpenedSource:
+    addresses = uri.items or ("0", "1")
+    chosen = rig_of(settings, None, len(addresses))
+    named = {camera.name: camera for camera in settings.rig.cameras}
+    cameras = tuple(
+        _live_camera(address, camera.name, (camera.width_px, camera.height_px), named.get(camera.name))
+        for address, camera in zip(addresses, chosen.rig.cameras, strict=True)
+    )
+    source = LiveSource(cameras, clocks.monotonic, clocks.stopwatch)
+    return OpenedSource(source, chosen, live=True, warnings=(*source.warnings, *_doubts(chosen)))
+
+
+def _doubts(chosen: ChosenRig) -> tuple[str, ...]:
+    """Warn of real cameras seen by a drawing."""
+    if not chosen.nominal:
+        return ()
+    return ("the cameras are not calibrated: the config's nominal ones do for a look, not for flight",)
+
+
+def _live_camera(address: str, name: str, size_px: tuple[int, int], settings: CameraSettings | None) -> LiveCamera:
+    """Describe a camera: its size by its calibration, the rest by the config's camera of the same name, if any."""
+    width_px, height_px = size_px
+    if settings is None:
+        return LiveCamera(address, name, width_px=width_px, height_px=height_px)
+    return LiveCamera(
+        address,
+        name,
+        fps=settings.frame_rate_hz,
+        width_px=width_px,
+        height_px=height_px,
+        fourcc=settings.fourcc,
+        exposure_ms=settings.exposure_ms,
+        latency_ms=settings.latency_ms,
+        lock=settings.lock,
+    )
+
+
+_OPENERS: Mapping[SourceKind, Callable[[SourceUri, Settings, Clocks], OpenedSource]] = {
+    SourceKind.RECORDING: _open_recording,
+    SourceKind.VIDEO: _open_video,
+    SourceKind.CAMERA: _open_cameras,
+}

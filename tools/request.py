@@ -1,0 +1,82 @@
+"""What the command line was asked to do, and the clocks it does it by."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tracker.errors import OperatorError
+
+if TYPE_CHECKING:  # only a name here: a mistyped option should not wait for pydantic
+    from bridge.settings import Settings
+
+SHORTEST_DEMO_S, LONGEST_DEMO_S = 1.0, 3600.0
+
+
+class Pace(StrEnum):
+    """How fast a source that is not live runs."""
+
+    REAL = "real"
+    FAST = "fast"
+
+
+class ExportFormat(StrEnum):
+    """What a log can be written as."""
+
+    TUM = "tum"
+    CSV = "csv"
+
+
+@dataclass(frozen=True, slots=True)
+class Clocks:
+    """The real clocks, taken by the command line alone.
+
+    monotonic: the host's monotonic clock, the time base of live frames [ns].  stopwatch: measures durations [ns].
+    wall: the calendar's time, only ever written beside the monotonic one in the log [ns].
+    sleep_s: waits [s].
+    """
+
+    monotonic: Callable[[], int]
+    stopwatch: Callable[[], int]
+    wall: Callable[[], int]
+    sleep_s: Callable[[float], None]
+
+
+@dataclass(frozen=True, slots=True)
+class RunRequest:
+    """One run. source: the URI as given.  log, summary: files to write, None for none."""
+
+    settings: Settings
+    source: str
+    log: Path | None
+    pace: Pace
+    summary: Path | None
+    overwrite: bool
+    quiet: bool
+
+
+@dataclass(frozen=True, slots=True)
+class DemoRequest:
+    """One demo flight of `duration_s` [s]; its files go to the folder `out`.
+
+    Raises:
+        OperatorError: a duration outside 1 to 3600 s, or a negative seed.
+    """
+
+    duration_s: float
+    seed: int
+    out: Path
+    pace: Pace
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.duration_s) and SHORTEST_DEMO_S <= self.duration_s <= LONGEST_DEMO_S):
+            raise OperatorError(
+                f"--duration_s: {self.duration_s:g} s must be {SHORTEST_DEMO_S:g} to {LONGEST_DEMO_S:g} s; "
+                "give a length within"
+            )
+        if self.seed < 0:
+            raise OperatorError(f"--seed: {self.seed} must be 0 or more; give another number")

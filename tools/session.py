@@ -1,0 +1,133 @@
+"""One `posebridge run`, put together: settings in, a source flown to its end, figures out."""
+
+from __future__ import annotations
+
+import importlib.metadata
+import json
+from collections.abc import Iterator
+from contextlib import ExitStack
+from pathlib import Path
+
+from rich.console import Console
+
+from bridge.clock import Clock, HostClock, StreamClock
+from bridge.monitor import Monitor
+from bridge.outlet import Outlet, open_outlet
+from bridge.pace import Paced, first_time_ns
+from bridge.recorder import Recorder
+from bridge.run import Outlets, Steps, close, run
+from bridge.settings import Settings
+from bridge.settings.tuning import tuning_of
+from bridge.status import StatusLine
+from bridge.summary import to_text
+from tools.open_source import OpenedSource, open_source
+from tools.request import Clocks, Pace, RunRequest
+from tools.summary_file import check_summary_path, write_summary
+from tracker.paper import PaperTracker
+from tracker.pipeline import Tracker
+from tracker.rig import Rig
+from tracker.types import Event
+
+LOGGED_PACKAGES = ("posebridge", "numpy", "opencv-python-headless", "filterpy", "pymavlink", "scipy", "mcap")
+
+
+def run_session(request: RunRequest, clocks: Clocks) -> None:
+    """Fly a source to its end, or to Ctrl-C, which closes links and log in order and is raised again.
+
+    Raises:
+        OperatorError: a source, link, log or summary that cannot be opened.
+        KeyboardInterrupt: the operator ended the run.
+    """
+    console = Console(stderr=True)
+    if request.summary is not None:
+        check_summary_path(request.summary)
+    with ExitStack() as stack:
+        opened = open_source(request.source, request.settings, clocks)
+        stack.enter_context(opened.source)
+        for warning in opened.warnings:
+            console.print(f"posebridge: warning: {warning}", style="yellow", soft_wrap=True, highlight=False)
+        outlet = links_of(request.settings, clocks)
+        stack.callback(outlet.close)
+        recorder = _recorder(request, opened, clocks)
+        monitor = Monitor(tuple(camera.name for camera in opened.chosen.rig.cameras))
+        status = None if request.quiet else stack.enter_context(StatusLine(console, clocks.stopwatch))
+        outlets = Outlets(outlet, monitor, recorder, status)
+        events, clock = _paced(opened, request.pace, clocks)
+        try:
+            run(events, tracker_of(request.settings, opened.chosen.rig, clocks), clock, outlets)
+        finally:
+            close(clock, outlets)
+            stack.close()
+            _report(outlets, request, console)
+
+
+def _report(outlets: Outlets, request: RunRequest, console: Console) -> None:
+    """Give the run's figures, an interrupted one's too."""
+    summary = outlets.summary(None if request.log is None else str(request.log))
+    if not request.quiet:
+        console.print(to_text(summary))
+    if request.summary is not None:
+        write_summary(request.summary, summary)
+
+
+def tracker_of(settings: Settings, rig: Rig, clocks: Clocks) -> Steps:
+    """Make the tracker that the config's method names."""
+    tuning = tuning_of(settings.tracker)
+    made = PaperTracker if settings.tracker.method == "paper" else Tracker
+    return made(rig, tuning, clocks.stopwatch)
+
+
+def links_of(settings: Settings, clocks: Clocks) -> Outlet:
+    """Open the links that the config or the command line names."""
+    return open_outlet(
+        [(link.uri, tuple(link.messages)) for link in settings.links],
+        system_id=settings.mavlink.system_id,
+        component_id=settings.mavlink.component_id,
+        room_yaw_deg=settings.room.room_yaw_deg,
+        stopwatch=clocks.stopwatch,
+    )
+
+
+def recorder_of(
+    path: Path, settings: Settings, rig: Rig, about: dict[str, str], clocks: Clocks, **how: bool
+) -> Recorder:
+    """Open the log of a run: the config and what it ran on go into it."""
+    versions = {name: _version(name) for name in LOGGED_PACKAGES}
+    return Recorder(
+        path,
+        attachments={"config.json": json.dumps(settings.model_dump(mode="json"), indent=2).encode()},
+        metadata={"run": about, "versions": versions},
+        cameras=rig.cameras,
+        marker=rig.marker,
+        wall_clock=clocks.wall,
+        **how,
+    )
+
+
+def _recorder(request: RunRequest, opened: OpenedSource, clocks: Clocks) -> Recorder | None:
+    if request.log is None:
+        return None
+    about = {"source": request.source, "pace": request.pace.value, "calibration": opened.chosen.origin.value}
+    fast = request.pace is Pace.FAST and not opened.live
+    rig = opened.chosen.rig
+    return recorder_of(
+        request.log, request.settings, rig, about, clocks, overwrite=request.overwrite, block_when_full=fast
+    )
+
+
+def _paced(opened: OpenedSource, pace: Pace, clocks: Clocks) -> tuple[Iterator[Event], Clock]:
+    """Return the events and the clock they go by."""
+    if opened.live:
+        return iter(opened.source), HostClock(clocks.monotonic)
+    if pace is Pace.FAST:
+        return iter(opened.source), StreamClock()
+    start_ns, events = first_time_ns(opened.source)
+    clock = HostClock(clocks.monotonic, start_ns)
+    return iter(Paced(events, clock, clocks.sleep_s, clocks.stopwatch)), clock
+
+
+def _version(package: str) -> str:
+    try:
+        return importlib.metadata.version(package)
+    except importlib.metadata.PackageNotFoundError:
+        return "not installed"
