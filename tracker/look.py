@@ -7,80 +7,92 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tracker.appearance import Appearance
 from tracker.camera import Camera
-from tracker.centre import Blur, Centre, fit_centre
+from tracker.centre import Centre, Expected, fit_centres
 from tracker.detect import Blob, find_blobs, region_around
 from tracker.measure import predicted_pixels
 from tracker.rig import Rig
 from tracker.state import State
-from tracker.types import Array, BallSighting, Frame, Reason, Rejected
+from tracker.types import Array, BallSighting, Frame, Reason, Rejected, frozen_array
 
 REGION_SIGMA = 3.5
 REGION_MARGIN_PX = 3.0
 LEAST_AREA_SHARE, MOST_AREA_SHARE = 0.15, 4.0  # of the ball's expected disc
 NEAREST_M = 0.3  # a ball closer to a camera than this is not looked for
-BLUR_MEMORY = 0.05
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fitted:
+    """A sighting with what was expected of the ball and what the fit gave: what `Appearance` learns from."""
+
+    sighting: BallSighting
+    expected: Expected
+    centre: Centre
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What one image gave: sightings, what was left out, and the camera's blur as known now."""
+    """What one image gave, and what was left out."""
 
-    sightings: tuple[BallSighting, ...]
+    fitted: tuple[Fitted, ...]
     rejections: tuple[Rejected, ...]
-    blur: Blur
 
 
-def look_near(frame: Frame, rig: Rig, state: State, blur: Blur, floor_px: float) -> Look:
+def look_near(frame: Frame, rig: Rig, state: State, appearance: Appearance, floor_px: float) -> Look:
     """Find each ball in the region where a state, with its covariance, expects it.
 
     Args:
         state: carried to about the frame's time.
-        blur: the camera's blur so far.
-        floor_px: see `centre.fit_centre`.
+        appearance: how balls look here.
+        floor_px: one sigma of what the fit cannot know, added to its covariance [px].
     """
     camera = rig.cameras[frame.camera]
     uv_px, H = predicted_pixels(state, camera, rig.marker, frame.t_ns)
     depths = camera.in_camera(rig.marker.points_inB @ state.R_BtoW.T + state.p_BinW)[:, 2]
-    sightings: list[BallSighting] = []
+    spreads = H @ state.P @ H.transpose(0, 2, 1) + np.eye(2)
+    balls: list[int] = []
+    expected: list[Expected] = []
     rejections: list[Rejected] = []
     for b, ball in enumerate(rig.marker.balls):
         if not np.isfinite(uv_px[b]).all() or depths[b] < NEAREST_M:
-            rejections.append(
-                Rejected(Reason.BEHIND, f"{ball.name} is not before the camera", frame.t_ns, frame.camera)
-            )
+            rejections.append(_rejected(Reason.BEHIND, f"{ball.name} is not before the camera", frame))
             continue
-        S = H[b] @ state.P @ H[b].T + np.eye(2)
-        found = _look_for(frame, rig, b, uv_px[b], S, camera.focal_px * ball.radius_m / depths[b], blur, floor_px)
-        if isinstance(found, Rejected):
-            rejections.append(found)
+        radius_px = camera.focal_px * ball.radius_m / float(depths[b])
+        blob = _nearest_blob(frame, rig, b, uv_px[b], spreads[b], radius_px)
+        if isinstance(blob, Rejected):
+            rejections.append(blob)
             continue
-        sightings.append(BallSighting(frame.camera, b, frame.t_ns, found.uv_px, found.cov_px))
-        blur = _learned(blur, found.blur)
-    return Look(tuple(sightings), tuple(rejections), blur)
+        bearing = camera.bearings(blob.uv_px[None])[0]
+        u, v = blob.uv_px.tolist()
+        balls.append(b)
+        expected.append(Expected((u, v), radius_px, (0.0, 0.0), appearance.shades(camera, bearing)))
+    found = fit_centres(frame.image, expected, appearance.blurs[frame.camera]) if expected else []
+    fitted = []
+    for b, what, centre in zip(balls, expected, found, strict=True):
+        if isinstance(centre, Reason):
+            rejections.append(_rejected(centre, f"{rig.marker.balls[b].name} at {_at(what)}", frame))
+            continue
+        cov_px = frozen_array(centre.cov_px + floor_px**2 * np.eye(2))
+        fitted.append(Fitted(BallSighting(frame.camera, b, frame.t_ns, centre.uv_px, cov_px), what, centre))
+    return Look(tuple(fitted), tuple(rejections))
 
 
-def _look_for(
-    frame: Frame, rig: Rig, b: int, uv_px: Array, S: Array, radius_px: float, blur: Blur, floor_px: float
-) -> Centre | Rejected:
-    """Find one ball near uv_px (2,), whose prediction has covariance S (2, 2) [px^2]."""
+def _nearest_blob(frame: Frame, rig: Rig, b: int, uv_px: Array, S: Array, radius_px: float) -> Blob | Rejected:
+    """Find the blob of one ball's colour nearest uv_px (2,), whose prediction has covariance S (2, 2) [px^2]."""
     ball = rig.marker.balls[b]
     half = REGION_SIGMA * np.sqrt(np.diag(S)) + radius_px + REGION_MARGIN_PX
     height_px, width_px = frame.image.shape[:2]
     region = region_around(uv_px, half, width_px, height_px)
     if region is None:
-        return Rejected(Reason.AT_BORDER, f"{ball.name} is out of view", frame.t_ns, frame.camera)
+        return _rejected(Reason.AT_BORDER, f"{ball.name} is out of view", frame)
     area = math.pi * radius_px**2
     blobs = find_blobs(frame.image, region, (ball,), MOST_AREA_SHARE * area)[0]
     likely = [blob for blob in blobs if blob.area_px >= LEAST_AREA_SHARE * area]
     if not likely:
-        return Rejected(Reason.NO_BALL, f"no {ball.name} where it is expected", frame.t_ns, frame.camera)
+        return _rejected(Reason.NO_BALL, f"no {ball.name} where it is expected", frame)
     inverse = np.linalg.inv(S)
-    nearest = min(likely, key=lambda blob: float((blob.uv_px - uv_px) @ inverse @ (blob.uv_px - uv_px)))
-    found = fit_centre(frame.image, nearest.uv_px, radius_px, blur, floor_px)
-    if isinstance(found, Rejected):
-        return Rejected(found.reason, f"{ball.name}: {found.detail}", frame.t_ns, frame.camera)
-    return found
+    return min(likely, key=lambda blob: float((blob.uv_px - uv_px) @ inverse @ (blob.uv_px - uv_px)))
 
 
 def look_everywhere(frame: Frame, camera: Camera, rig: Rig) -> list[list[Blob]]:
@@ -90,9 +102,9 @@ def look_everywhere(frame: Frame, camera: Camera, rig: Rig) -> list[list[Blob]]:
     return find_blobs(frame.image, None, rig.marker.balls, most_px)
 
 
-def _learned(blur: Blur, seen: Blur) -> Blur:
-    """Let the camera's blur drift towards what a ball showed."""
-    return Blur(
-        blur.luma_px + BLUR_MEMORY * (seen.luma_px - blur.luma_px),
-        blur.chroma_px + BLUR_MEMORY * (seen.chroma_px - blur.chroma_px),
-    )
+def _rejected(reason: Reason, detail: str, frame: Frame) -> Rejected:
+    return Rejected(reason, detail, frame.t_ns, frame.camera)
+
+
+def _at(ball: Expected) -> str:
+    return f"({ball.uv_px[0]:.0f}, {ball.uv_px[1]:.0f}) px"

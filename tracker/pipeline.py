@@ -18,10 +18,11 @@ from scipy.stats import chi2
 
 from tracker import so3
 from tracker.acquire import first_state
+from tracker.appearance import Appearance
 from tracker.centre import Blur
 from tracker.detect import Blob
 from tracker.ekf import Update, predict, update
-from tracker.look import look_everywhere, look_near
+from tracker.look import Fitted, look_everywhere, look_near
 from tracker.rig import Rig
 from tracker.rounds import Rounds
 from tracker.state import State
@@ -40,6 +41,8 @@ from tracker.types import (
 
 HISTORY = 8  # updates that a late frame can be put in before
 RESETS = 256
+LEARN_ALL = 144  # balls; then
+LEARN_EVERY = 4  # rounds one ball
 
 Round = tuple[Frame, ...]
 
@@ -72,7 +75,8 @@ class Tracker:
         self._tuning = tuning
         self._stopwatch = stopwatch
         self._rounds = Rounds(len(rig.cameras), tuning.sync_window_ns)
-        self._blurs = [Blur() for _ in rig.cameras]
+        self._appearance = Appearance(tuple(Blur() for _ in rig.cameras))
+        self._turn = 0
         self._past: deque[_Past] = deque(maxlen=HISTORY)
         self._whole: dict[int, tuple[Frame, list[list[Blob]]]] = {}
         self._track = TrackState.SEARCHING
@@ -143,19 +147,28 @@ class Tracker:
 
     def _see(self, frames: Round, ahead: State, harvest: _Harvest) -> Update | None:
         """Look where a predicted state expects the balls and update it, or return None."""
-        seen: list[BallSighting] = []
+        fitted: list[tuple[Frame, Fitted]] = []
         for frame in frames:
-            look = look_near(frame, self._rig, ahead, self._blurs[frame.camera], self._tuning.pixel_noise_floor_px)
-            self._blurs[frame.camera] = look.blur
-            seen += look.sightings
+            look = look_near(frame, self._rig, ahead, self._appearance, self._tuning.pixel_noise_floor_px)
+            fitted += [(frame, one) for one in look.fitted]
             harvest.rejections += look.rejections
-        result = self._update(ahead, tuple(seen))
+        result = self._update(ahead, tuple(one.sighting for _, one in fitted))
         if isinstance(result, Rejected):
             harvest.rejections.append(result)
             return None
         harvest.sightings += result.used
         harvest.rejections += result.rejected
+        self._learn([(frame, one) for frame, one in fitted if one.sighting in result.used])
         return result
+
+    def _learn(self, fitted: list[tuple[Frame, Fitted]]) -> None:
+        """Learn how balls look: from every one at first, then from one in turn every few rounds."""
+        self._turn += 1
+        if self._appearance.light.count >= LEARN_ALL:
+            fitted = [fitted[self._turn // LEARN_EVERY % len(fitted)]] if self._turn % LEARN_EVERY == 0 else []
+        for frame, one in fitted:
+            camera = self._rig.cameras[frame.camera]
+            self._appearance = self._appearance.learned(frame.image, camera, frame.camera, one.expected, one.centre)
 
     def _update(self, ahead: State, sightings: tuple[BallSighting, ...]) -> Update | Rejected:
         """Update a predicted state and remember it."""

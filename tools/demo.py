@@ -1,0 +1,178 @@
+"""The whole of posebridge with nothing attached: a simulated helicopter flies on the poses the bridge sends it.
+
+    world (helicopter, wind, autopilot) -> rendered frames -> tracker -> MAVLink over UDP -> the world's autopilot
+
+Nothing but those datagrams leads back to the helicopter.
+"""
+
+from __future__ import annotations
+
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+
+from bridge.clock import Clock, HostClock, StreamClock
+from bridge.monitor import Monitor
+from bridge.outlet import Outlet, open_outlet
+from bridge.pace import Paced
+from bridge.pack import MESSAGES
+from bridge.run import Outlets, Steps, close, run
+from bridge.settings import Settings, load_settings, rig_of
+from bridge.status import StatusLine
+from bridge.summary import Summary, to_text
+from bridge.wire import Sent
+from tools.demo_plot import draw_flight
+from tools.request import Clocks, DemoRequest, Pace
+from tools.session import recorder_of, tracker_of
+from tools.simulate.autopilot import Mode
+from tools.simulate.flight import Flight, flight_of
+from tools.simulate.helicopter import Helicopter
+from tools.simulate.mission import Mission
+from tools.simulate.verdict import Verdict, judge
+from tools.simulate.world import Surroundings, World
+from tools.summary_file import write_summary
+from tracker.errors import OperatorError
+from tracker.sources.paths import Pose, Vehicle
+from tracker.sources.sim import START_NS, SimSource, SimTiming
+from tracker.types import Estimate, Event, Step
+
+LOG, SUMMARY, VERDICT, PLOT = "flight.mcap", "summary.json", "verdict.json", "flight.png"
+DEMO_CONFIG = "lab"
+_RATE_HZ = 15.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DemoResult:
+    """What a demo flight came to. out: the folder with log, summary, verdict and picture."""
+
+    flight: Flight
+    verdict: Verdict
+    summary: Summary
+    out: Path
+
+
+def run_demo(request: DemoRequest, clocks: Clocks, console: Console | None = None) -> DemoResult:
+    """Fly the demo mission and leave log, summary, verdict and picture in the request's folder.
+
+    With pace `fast` the same seed gives the same flight.
+
+    Raises:
+        OperatorError: a folder that cannot be made, or too short a time.
+    """
+    console = console or Console(stderr=True)
+    surroundings, helicopter = Surroundings(), Helicopter()
+    mission = Mission(request.duration_s, surroundings.floor_z_m + helicopter.skid_m)
+    _make_folder(request.out)
+    settings = load_settings(DEMO_CONFIG)
+    with ExitStack() as stack:
+        world = World(mission, START_NS, surroundings, helicopter, request.seed)
+        stack.callback(world.close)
+        witness, summary = _fly(request, clocks, settings, world, console)
+        flight = flight_of(
+            world.history,
+            witness.estimates,
+            witness.latency_ms,
+            mission.corners_inW,
+            world.autopilot.mode is Mode.LANDED,
+        )
+    result = DemoResult(flight, judge(flight), summary, request.out)
+    _leave(result, request, console)
+    return result
+
+
+class _Witness:
+    """Stand between tracker and outlet and keep what the verdict needs: estimates, truth at their time, latencies."""
+
+    def __init__(self, tracker: Steps, vehicle: Vehicle) -> None:
+        self._tracker = tracker
+        self._vehicle = vehicle
+        self.estimates: list[tuple[Estimate, Pose]] = []
+        self.latency_ms: list[float] = []
+
+    def step(self, event: Event) -> Step:
+        """Take one event to the tracker."""
+        return self._keep(self._tracker.step(event))
+
+    def finish(self) -> Step:
+        """Let the tracker finish."""
+        return self._keep(self._tracker.finish())
+
+    def heard(self, sent: tuple[Sent, ...]) -> tuple[Sent, ...]:
+        """Note how late messages left."""
+        self.latency_ms += [(each.sent_ns - each.available_ns) / 1e6 for each in sent if each.available_ns]
+        return sent
+
+    def _keep(self, step: Step) -> Step:
+        self.estimates += [(estimate, self._vehicle.pose_at(estimate.t_ns)) for estimate in step.estimates]
+        return step
+
+
+class _WatchedMonitor(Monitor):
+    """A monitor that lets the witness see what was sent."""
+
+    def __init__(self, camera_names: tuple[str, ...], witness: _Witness) -> None:
+        super().__init__(camera_names)
+        self._witness = witness
+
+    def take(self, event: Event | None, step: Step, sent: tuple[Sent, ...]) -> None:
+        """Count one turn of the loop."""
+        super().take(event, step, self._witness.heard(sent))
+
+
+def _fly(
+    request: DemoRequest, clocks: Clocks, settings: Settings, world: World, console: Console
+) -> tuple[_Witness, Summary]:
+    """Run the loop once around."""
+    rig = rig_of(settings, None).rig
+    timing = SimTiming(_RATE_HZ, request.duration_s, START_NS, delay_ns=world.surroundings.delay_ns)
+    log = request.out / LOG
+    with ExitStack() as stack:
+        source = stack.enter_context(SimSource(rig, world, clocks.stopwatch, timing, seed=request.seed))
+        witness = _Witness(tracker_of(settings, rig, clocks), world)
+        outlet = _outlet(settings, world, clocks)
+        stack.callback(outlet.close)
+        about = {"source": "demo", "pace": request.pace.value, "seed": str(request.seed)}
+        fast = request.pace is Pace.FAST
+        recorder = recorder_of(log, settings, rig, about, clocks, overwrite=True, block_when_full=fast)
+        monitor = _WatchedMonitor(tuple(camera.name for camera in rig.cameras), witness)
+        status = stack.enter_context(StatusLine(console, clocks.stopwatch))
+        outlets = Outlets(outlet, monitor, recorder, status)
+        clock: Clock = StreamClock() if fast else HostClock(clocks.monotonic, START_NS)
+        events = source if fast else Paced(source, clock, clocks.sleep_s, clocks.stopwatch)
+        try:
+            run(events, witness, clock, outlets)
+        finally:
+            close(clock, outlets)
+    return witness, outlets.summary(str(log))
+
+
+def _outlet(settings: Settings, world: World, clocks: Clocks) -> Outlet:
+    """Open the one link: to the simulated autopilot, in place of those the config names."""
+    return open_outlet(
+        [(f"udpout:127.0.0.1:{world.autopilot.port}", MESSAGES)],
+        system_id=settings.mavlink.system_id,
+        component_id=settings.mavlink.component_id,
+        room_yaw_deg=world.surroundings.room_yaw_deg,
+        stopwatch=clocks.stopwatch,
+    )
+
+
+def _make_folder(out: Path) -> None:
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OperatorError(f"--out {out}: cannot be made ({error.strerror}); name another folder") from error
+
+
+def _leave(result: DemoResult, request: DemoRequest, console: Console) -> None:
+    """Write the files and show the figures."""
+    write_summary(request.out / SUMMARY, result.summary)
+    (request.out / VERDICT).write_text(result.verdict.to_json(), encoding="utf-8")
+    held = "held its path" if result.verdict.passed else "DID NOT hold its path"
+    title = f"posebridge demo: {request.duration_s:g} s, seed {request.seed}, the helicopter {held}"
+    draw_flight(result.flight, title, request.out / PLOT)
+    console.print(to_text(result.summary))
+    console.print(result.verdict.to_table())
+    console.print(f"{held[0].upper()}{held[1:]}. Log, summary, verdict and picture: {request.out}")

@@ -1,0 +1,67 @@
+"""How balls look in this room and these cameras, learned while tracking: the light and each camera's blur."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+
+import numpy as np
+
+from tracker.camera import Camera
+from tracker.centre import Blur, Centre, Expected, cut, light_on, patch_half, sharper
+from tracker.light import Light, ray_frame
+from tracker.template import FLAT, Shades
+from tracker.types import Array, Image
+
+BEARING_STEP_RAD = 0.07  # rays closer than this share a ball's shading
+PUBLISH_AT = (18, 36, 72, 144, 288)  # balls learned when templates follow the light, then every last of these
+BLUR_STEP_PX = 0.03
+BLUR_MAX_PX = 1.5
+MISFIT_MAX = 2.0  # an image that fits no ball teaches nothing
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Appearance:
+    """What is known so far.
+
+    light: learned.  shown: the light that templates are drawn by; it follows `light` in few, growing steps.
+    blurs: of each camera.
+    """
+
+    blurs: tuple[Blur, ...]
+    light: Light = field(default_factory=Light)
+    shown: Light = field(default_factory=Light)
+
+    def shades(self, camera: Camera, bearing_inC: Array) -> Shades:
+        """Return how a ball is shaded that a camera sees along a bearing (3,)."""
+        if not self.shown.count:
+            return FLAT
+        x, y = (round(float(bearing_inC[i] / bearing_inC[2]) / BEARING_STEP_RAD) for i in (0, 1))
+        return _shades(self.shown, camera, x, y)
+
+    def learned(self, image: Image, camera: Camera, index: int, ball: Expected, found: Centre) -> Appearance:
+        """Return what is known after one more ball.
+
+        Args:
+            image: the camera's, BGR.
+            index: the camera's place in the rig.
+            ball, found: what was expected of the ball and what its fit gave.
+        """
+        if found.misfit > MISFIT_MAX:
+            return self
+        patches = cut(image, [ball], patch_half([ball]))
+        centre = found.uv_px - patches.middle[0]
+        blur = sharper(patches, ball, centre, self.blurs[index], BLUR_STEP_PX, BLUR_MAX_PX)
+        R_RtoW = ray_frame(camera.bearings(found.uv_px[None])[0], camera.R_CtoW)
+        equations = light_on(patches, ball, centre, blur, self.light.lamp_seen(R_RtoW))
+        light = self.light if equations is None else self.light.learned(*equations, R_RtoW)
+        due = light.count in PUBLISH_AT or light.count % PUBLISH_AT[-1] == 0
+        shown = light if due and light.trusted else self.shown
+        return replace(self, blurs=(*self.blurs[:index], blur, *self.blurs[index + 1 :]), light=light, shown=shown)
+
+
+@lru_cache(maxsize=4096)
+def _shades(light: Light, camera: Camera, x_steps: int, y_steps: int) -> Shades:
+    """Return the shades along a rounded bearing; light and camera are told apart by identity."""
+    bearing = np.array([x_steps * BEARING_STEP_RAD, y_steps * BEARING_STEP_RAD, 1.0])
+    return light.shades(ray_frame(bearing / np.linalg.norm(bearing), camera.R_CtoW))

@@ -1,0 +1,83 @@
+"""The room's light, learned from the balls it falls on.
+
+All balls are matt, of one paint each, and far smaller than the room: the brightness of a ball at a point with normal
+n is its paint times one function of n in the room, E(n) = e + a.n + max(0, n.L): even light, light that comes from
+one side, and a lamp. It is learned from the balls' own images; afterwards a ball's image is known up to two factors,
+and the shaded limb no longer pulls its centre towards the lamp.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from tracker.template import TERMS, Shades, Vector
+from tracker.types import Array
+
+FORGETTING = 0.98  # a ball: the light of about the last fifty counts
+ENOUGH = 12  # balls until the light is trusted
+RIDGE = np.array([0.0, 0.05, 0.05, 0.05, 0.002, 0.002, 0.002])  # a lamp explains what it can, one-sided light the rest
+LAMP_STEPS = 32  # directions and weights are rounded to 1 / LAMP_STEPS, so that templates can be kept
+_UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Light:
+    """What is known of the light.
+
+    lamp: (3,) unit vector to the lamp in W.  terms: (TERMS,) of E in W, relative to its mean over a disc.
+    information (TERMS, TERMS), target (TERMS,): normal equations of what was learned.  count: balls learned.
+    """
+
+    lamp: Array = field(default_factory=lambda: _UP)
+    terms: Array = field(default_factory=lambda: np.eye(TERMS)[0])
+    information: Array = field(default_factory=lambda: np.zeros((TERMS, TERMS)))
+    target: Array = field(default_factory=lambda: np.zeros(TERMS))
+    count: int = 0
+
+    @property
+    def trusted(self) -> bool:
+        """Say whether enough balls were learned."""
+        return self.count >= ENOUGH
+
+    def learned(self, information: Array, target: Array, R_RtoW: Array) -> Light:
+        """Return the light with one more ball in it.
+
+        Args:
+            information (TERMS, TERMS), target (TERMS,): normal equations of the terms in the ball's ray frame, with
+                the lamp of `lamp_seen`, scaled to mean brightness 1.
+            R_RtoW: (3, 3) turns the ray's frame into the room.
+        """
+        T = np.eye(TERMS)
+        T[1:4, 1:4] = T[4:7, 4:7] = R_RtoW
+        information = FORGETTING * self.information + T @ information @ T.T
+        target = FORGETTING * self.target + T @ target
+        ridge = np.diag(RIDGE * information[0, 0] + 1e-9)
+        terms = np.asarray(np.linalg.solve(information + ridge, target), dtype=np.float64)
+        pull = terms[1:4] + terms[4:7]
+        length = float(np.linalg.norm(terms[4:7]))
+        lamp = np.asarray(terms[4:7] / length) if length > 0.0 and float(pull @ terms[4:7]) > 0.0 else self.lamp
+        return Light(lamp, terms, information, target, self.count + 1)
+
+    def lamp_seen(self, R_RtoW: Array) -> Vector:
+        """Return the lamp's direction in a ray's frame, rounded."""
+        x, y, z = np.round(R_RtoW.T @ self.lamp * LAMP_STEPS) / LAMP_STEPS
+        return float(x), float(y), float(z)
+
+    def shades(self, R_RtoW: Array) -> Shades:
+        """Return the shapes of a ball seen along a ray: its coverage, and its coverage times the light."""
+        weights = np.concatenate((self.terms[:1], R_RtoW.T @ self.terms[1:4], R_RtoW.T @ self.terms[4:7]))
+        rounded = np.round(weights / weights[0] * LAMP_STEPS) / LAMP_STEPS
+        return Shades(self.lamp_seen(R_RtoW), ((1.0,) + (0.0,) * (TERMS - 1), tuple(float(w) for w in rounded)))
+
+
+def ray_frame(bearing_inC: Array, R_CtoW: Array) -> Array:
+    """Return R_RtoW (3, 3) of the frame in which a ball's image is drawn.
+
+    R: x right, y down in the image, z from the ball towards the camera, which makes it left-handed as images are.
+    """
+    x = np.array([bearing_inC[2], 0.0, -bearing_inC[0]])
+    x /= np.sqrt(x[0] ** 2 + x[2] ** 2)
+    y = np.cross(bearing_inC, x)
+    return np.asarray(R_CtoW @ np.column_stack((x, y, -bearing_inC)))
