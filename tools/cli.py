@@ -17,17 +17,22 @@ import typer
 from tools.request import Clocks, DemoRequest, ExportFormat, Pace, RunRequest
 from tracker.errors import OperatorError
 
+EXIT_PATH_NOT_HELD = 1
 EXIT_OPERATOR = 2
 EXIT_INTERRUPTED = 130
 STDOUT = Path("-")
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+bench = typer.Typer(help="Measure accuracy, speed and memory: the figures in docs/benchmarks.md.")
+app.add_typer(bench, name="bench")
+ConfigOption = Annotated[str, typer.Option(help="A shipped config by name, or a path to a .toml.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")]
 
 # Commands import what they need when they run, so that `--help` and a mistyped option answer at once.
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line and exit: 0 done, 2 something the operator can mend, 130 interrupted."""
+    """Run the command line and exit: 0 done, 1 a demo that did not hold its path, 2 something the operator can mend, 130 interrupted."""
     sys.exit(run_command_line(sys.argv[1:] if arguments is None else arguments))
 
 
@@ -92,7 +97,7 @@ def posebridge(
 
 @app.command()
 def run(
-    config: Annotated[str, typer.Option(help="A shipped config by name, or a path to a .toml.")] = "lab",
+    config: ConfigOption = "lab",
     source: Annotated[
         str, typer.Option(help="recording:DIR, video:A.mp4,B.mp4, camera:0,1 or sim:NAME.", metavar="URI")
     ] = "camera:0,1",
@@ -132,12 +137,16 @@ def demo(
     out: Annotated[Path, typer.Option(help="Folder for the log and the summary.", metavar="DIR")] = Path("logs/demo"),
     pace: Annotated[Pace, typer.Option(help="real: watch it fly. fast: as fast as it goes.")] = Pace.REAL,
 ) -> None:
-    """Fly a simulated helicopter on simulated cameras, closed loop, with nothing attached."""
+    """Fly a simulated helicopter on simulated cameras, closed loop, with nothing attached.
+
+    Exit code 0 only if it held its path; else 1.
+    """
     request = DemoRequest(duration_s, seed, out, pace)
 
     from tools.demo import run_demo
 
-    run_demo(request, _clocks())
+    if not run_demo(request, _clocks()).verdict.passed:
+        raise typer.Exit(EXIT_PATH_NOT_HELD)
 
 
 @app.command()
@@ -163,3 +172,42 @@ def export(
         typer.echo(f"{report.count} estimates written to {out}", err=True)
     for loss in report.lost:
         typer.echo(f"posebridge: warning: {log}: {loss}", err=True)
+
+
+@bench.command()
+def accuracy(
+    recordings: Annotated[list[Path], typer.Argument(help="Recordings with ground truth.", metavar="DIR...")],
+    config: ConfigOption = "lab",
+    json: JsonOption = False,
+) -> None:
+    """Compare estimates with the truth, by the filter and by the paper's own method."""
+    from bridge.settings import load_settings
+    from tools.bench.commands import bench_accuracy
+
+    bench_accuracy(recordings, load_settings(config), _clocks(), json)
+
+
+@bench.command()
+def speed(
+    pairs: Annotated[int, typer.Option(help="Stereo pairs to track.", min=1)] = 1000,
+    config: ConfigOption = "lab",
+    json: JsonOption = False,
+) -> None:
+    """Time tracking and acquisition with the frames in memory."""
+    from bridge.settings import load_settings
+    from tools.bench.commands import bench_speed
+
+    bench_speed(pairs, load_settings(config), _clocks(), json)
+
+
+@bench.command()
+def memory(
+    pairs: Annotated[int, typer.Option(help="Stereo pairs to run.", min=10)] = 20_000,
+    config: ConfigOption = "lab",
+    json: JsonOption = False,
+) -> None:
+    """Watch the process's size over a long run with link and log."""
+    from bridge.settings import load_settings
+    from tools.bench.commands import bench_memory
+
+    bench_memory(pairs, load_settings(config), _clocks(), json)

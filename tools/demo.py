@@ -17,14 +17,14 @@ from bridge.clock import Clock, HostClock, StreamClock
 from bridge.monitor import Monitor
 from bridge.outlet import Outlet, open_outlet
 from bridge.pace import Paced
-from bridge.pack import MESSAGES
 from bridge.run import Outlets, Steps, close, run
-from bridge.settings import Settings, load_settings, rig_of
+from bridge.settings import DEFAULT_MESSAGES, Settings, load_settings, rig_of
 from bridge.status import StatusLine
 from bridge.summary import Summary, to_text
 from bridge.wire import Sent
 from tools.demo_plot import draw_flight
 from tools.request import Clocks, DemoRequest, Pace
+from tools.seen_picture import draw_seen
 from tools.session import recorder_of, tracker_of
 from tools.simulate.autopilot import Mode
 from tools.simulate.flight import Flight, flight_of
@@ -34,11 +34,12 @@ from tools.simulate.verdict import Verdict, judge
 from tools.simulate.world import Surroundings, World
 from tools.summary_file import write_summary
 from tracker.errors import OperatorError
+from tracker.rig import Rig
 from tracker.sources.paths import Pose, Vehicle
 from tracker.sources.sim import START_NS, SimSource, SimTiming
-from tracker.types import Estimate, Event, Step
+from tracker.types import Estimate, Event, Frame, Step
 
-LOG, SUMMARY, VERDICT, PLOT = "flight.mcap", "summary.json", "verdict.json", "flight.png"
+LOG, SUMMARY, VERDICT, PLOT, SEEN = "flight.mcap", "summary.json", "verdict.json", "flight.png", "seen.png"
 DEMO_CONFIG = "lab"
 _RATE_HZ = 15.0
 
@@ -79,21 +80,45 @@ def run_demo(request: DemoRequest, clocks: Clocks, console: Console | None = Non
         )
     result = DemoResult(flight, judge(flight), summary, request.out)
     _leave(result, request, console)
+    if witness.seen is not None:
+        step = witness.seen.step
+        draw_seen(witness.seen.frames, step.sightings, step.estimates[0], witness.rig, request.out / SEEN)
     return result
 
 
-class _Witness:
-    """Stand between tracker and outlet and keep what the verdict needs: estimates, truth at their time, latencies."""
+@dataclass(frozen=True, slots=True, eq=False)
+class _Seen:
+    """One instant in which every ball was seen: its frames and what came of them."""
 
-    def __init__(self, tracker: Steps, vehicle: Vehicle) -> None:
+    frames: tuple[Frame, ...]
+    step: Step
+
+
+class _Witness:
+    """Stand between tracker and outlet and keep what the verdict needs: estimates, truth at their time, latencies.
+
+    picture_ns: the first instant from then on in which every ball is seen is kept whole, for a picture.
+    """
+
+    def __init__(self, tracker: Steps, vehicle: Vehicle, rig: Rig, picture_ns: int) -> None:
         self._tracker = tracker
         self._vehicle = vehicle
+        self._wanted = len(rig.cameras) * len(rig.marker)
+        self._picture_ns = picture_ns
+        self._frames: dict[int, Frame] = {}
+        self.rig = rig
+        self.seen: _Seen | None = None
         self.estimates: list[tuple[Estimate, Pose]] = []
         self.latency_ms: list[float] = []
 
     def step(self, event: Event) -> Step:
         """Take one event to the tracker."""
-        return self._keep(self._tracker.step(event))
+        step = self._keep(self._tracker.step(event))
+        if isinstance(event, Frame) and self.seen is None and event.t_ns >= self._picture_ns:
+            self._frames[event.camera] = event
+            if step.estimates and len(step.sightings) == self._wanted:
+                self.seen = _Seen(tuple(self._frames[camera] for camera in sorted(self._frames)), step)
+        return step
 
     def finish(self) -> Step:
         """Let the tracker finish."""
@@ -130,7 +155,8 @@ def _fly(
     log = request.out / LOG
     with ExitStack() as stack:
         source = stack.enter_context(SimSource(rig, world, clocks.stopwatch, timing, seed=request.seed))
-        witness = _Witness(tracker_of(settings, rig, clocks), world)
+        halfway_ns = START_NS + round(request.duration_s / 2.0 * 1e9)
+        witness = _Witness(tracker_of(settings, rig, clocks), world, rig, halfway_ns)
         outlet = _outlet(settings, world, clocks)
         stack.callback(outlet.close)
         about = {"source": "demo", "pace": request.pace.value, "seed": str(request.seed)}
@@ -145,13 +171,17 @@ def _fly(
             run(events, witness, clock, outlets)
         finally:
             close(clock, outlets)
+    if isinstance(events, Paced) and events.worst_lag_ns > 1e9 / _RATE_HZ:
+        lag_ms = events.worst_lag_ns / 1e6
+        warning = f"posebridge: warning: up to {lag_ms:.0f} ms behind real time; this computer is busy or slow"
+        console.print(warning, style="yellow", soft_wrap=True)
     return witness, outlets.summary(str(log))
 
 
 def _outlet(settings: Settings, world: World, clocks: Clocks) -> Outlet:
     """Open the one link: to the simulated autopilot, in place of those the config names."""
     return open_outlet(
-        [(f"udpout:127.0.0.1:{world.autopilot.port}", MESSAGES)],
+        [(f"udpout:127.0.0.1:{world.autopilot.port}", DEFAULT_MESSAGES)],
         system_id=settings.mavlink.system_id,
         component_id=settings.mavlink.component_id,
         room_yaw_deg=world.surroundings.room_yaw_deg,
@@ -173,6 +203,7 @@ def _leave(result: DemoResult, request: DemoRequest, console: Console) -> None:
     held = "held its path" if result.verdict.passed else "DID NOT hold its path"
     title = f"posebridge demo: {request.duration_s:g} s, seed {request.seed}, the helicopter {held}"
     draw_flight(result.flight, title, request.out / PLOT)
-    console.print(to_text(result.summary))
-    console.print(result.verdict.to_table())
-    console.print(f"{held[0].upper()}{held[1:]}. Log, summary, verdict and picture: {request.out}")
+    report = Console()
+    report.print(to_text(result.summary), soft_wrap=True)
+    report.print(result.verdict.to_table())
+    report.print(f"{held[0].upper()}{held[1:]}. Log, summary, verdict and picture: {request.out}", soft_wrap=True)

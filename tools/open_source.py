@@ -12,8 +12,10 @@ from tools.request import Clocks
 from tracker.errors import OperatorError
 from tracker.sources.live import LiveSource
 from tracker.sources.live_camera import LiveCamera
+from tracker.sources.paths import scripted_path
 from tracker.sources.protocol import Source
 from tracker.sources.recording import RecordingSource
+from tracker.sources.sim import START_NS, SimSource
 from tracker.sources.uri import EXAMPLES, SourceKind, SourceUri, parse_source
 from tracker.sources.video import VideoSource
 
@@ -70,6 +72,12 @@ def _open_cameras(uri: SourceUri, settings: Settings, clocks: Clocks) -> OpenedS
     return OpenedSource(source, chosen, live=True, warnings=(*source.warnings, *_doubts(chosen)))
 
 
+def _open_simulation(uri: SourceUri, settings: Settings, clocks: Clocks) -> OpenedSource:
+    chosen = rig_of(settings, None)
+    path = scripted_path(uri.argument, START_NS)
+    return OpenedSource(SimSource(chosen.rig, path, clocks.stopwatch), chosen, live=False)
+
+
 def _doubts(chosen: ChosenRig) -> tuple[str, ...]:
     """Warn of real cameras seen by a drawing."""
     if not chosen.nominal:
@@ -99,4 +107,5 @@ _OPENERS: Mapping[SourceKind, Callable[[SourceUri, Settings, Clocks], OpenedSour
     SourceKind.RECORDING: _open_recording,
     SourceKind.VIDEO: _open_video,
     SourceKind.CAMERA: _open_cameras,
+    SourceKind.SIM: _open_simulation,
 }

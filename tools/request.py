@@ -14,7 +14,7 @@ from tracker.errors import OperatorError
 if TYPE_CHECKING:  # only a name here: a mistyped option should not wait for pydantic
     from bridge.settings import Settings
 
-SHORTEST_DEMO_S, LONGEST_DEMO_S = 1.0, 3600.0
+SHORTEST_DEMO_S, LONGEST_DEMO_S = 15.0, 3600.0  # every phase of the mission needs its time
 
 
 class Pace(StrEnum):
@@ -64,7 +64,7 @@ class DemoRequest:
     """One demo flight of `duration_s` [s]; its files go to the folder `out`.
 
     Raises:
-        OperatorError: a duration outside 1 to 3600 s, or a negative seed.
+        OperatorError: a duration outside 15 to 3600 s, or a negative seed.
     """
 
     duration_s: float

@@ -58,14 +58,14 @@ def run_session(request: RunRequest, clocks: Clocks) -> None:
         finally:
             close(clock, outlets)
             stack.close()
-            _report(outlets, request, console)
+            _report(outlets, request)
 
 
-def _report(outlets: Outlets, request: RunRequest, console: Console) -> None:
-    """Give the run's figures, an interrupted one's too."""
+def _report(outlets: Outlets, request: RunRequest) -> None:
+    """Give the run's figures, an interrupted one's too, on stdout."""
     summary = outlets.summary(None if request.log is None else str(request.log))
     if not request.quiet:
-        console.print(to_text(summary))
+        Console().print(to_text(summary), soft_wrap=True)
     if request.summary is not None:
         write_summary(request.summary, summary)
 

@@ -8,15 +8,16 @@ from functools import lru_cache
 import numpy as np
 
 from tracker.camera import Camera
-from tracker.centre import Blur, Centre, Expected, cut, light_on, patch_half, sharper
+from tracker.centre import Centre
+from tracker.lesson import light_on, sharper
 from tracker.light import Light, ray_frame
+from tracker.patch import Blur, Expected, cut, patch_half
 from tracker.template import FLAT, Shades
 from tracker.types import Array, Image
 
 BEARING_STEP_RAD = 0.07  # rays closer than this share a ball's shading
 PUBLISH_AT = (18, 36, 72, 144, 288)  # balls learned when templates follow the light, then every last of these
 BLUR_STEP_PX = 0.03
-BLUR_MAX_PX = 1.5
 MISFIT_MAX = 2.0  # an image that fits no ball teaches nothing
 
 
@@ -49,11 +50,11 @@ class Appearance:
         """
         if found.misfit > MISFIT_MAX:
             return self
-        patches = cut(image, [ball], patch_half([ball]))
+        patches = cut([image], [ball], patch_half([ball]))
         centre = found.uv_px - patches.middle[0]
-        blur = sharper(patches, ball, centre, self.blurs[index], BLUR_STEP_PX, BLUR_MAX_PX)
+        blur = sharper(patches, ball, centre, BLUR_STEP_PX)
         R_RtoW = ray_frame(camera.bearings(found.uv_px[None])[0], camera.R_CtoW)
-        equations = light_on(patches, ball, centre, blur, self.light.lamp_seen(R_RtoW))
+        equations = light_on(patches, ball, centre, self.light.lamp_seen(R_RtoW))
         light = self.light if equations is None else self.light.learned(*equations, R_RtoW)
         due = light.count in PUBLISH_AT or light.count % PUBLISH_AT[-1] == 0
         shown = light if due and light.trusted else self.shown

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from tracker.appearance import Appearance
 from tracker.camera import Camera
-from tracker.centre import Centre, Expected, fit_centres
+from tracker.centre import Centre, fit_centres
 from tracker.detect import Blob, find_blobs, region_around
 from tracker.measure import predicted_pixels
+from tracker.patch import Expected
 from tracker.rig import Rig
 from tracker.state import State
 from tracker.types import Array, BallSighting, Frame, Reason, Rejected, frozen_array
@@ -24,58 +26,70 @@ NEAREST_M = 0.3  # a ball closer to a camera than this is not looked for
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fitted:
-    """A sighting with what was expected of the ball and what the fit gave: what `Appearance` learns from."""
+    """A sighting with its frame, what was expected of the ball and what the fit gave: what `Appearance` learns from."""
 
     sighting: BallSighting
+    frame: Frame
     expected: Expected
     centre: Centre
 
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What one image gave, and what was left out."""
+    """What the images of one instant gave, and what was left out."""
 
     fitted: tuple[Fitted, ...]
     rejections: tuple[Rejected, ...]
 
 
-def look_near(frame: Frame, rig: Rig, state: State, appearance: Appearance, floor_px: float) -> Look:
-    """Find each ball in the region where a state, with its covariance, expects it.
+def look_near(frames: Sequence[Frame], rig: Rig, state: State, appearance: Appearance, floor_px: float) -> Look:
+    """Find each ball in each image, in the region where a state, with its covariance, expects it.
 
     Args:
-        state: carried to about the frame's time.
+        frames: of different cameras, at about one time.
+        state: carried to about that time.
         appearance: how balls look here.
         floor_px: one sigma of what the fit cannot know, added to its covariance [px].
     """
-    camera = rig.cameras[frame.camera]
-    uv_px, H = predicted_pixels(state, camera, rig.marker, frame.t_ns)
-    depths = camera.in_camera(rig.marker.points_inB @ state.R_BtoW.T + state.p_BinW)[:, 2]
-    spreads = H @ state.P @ H.transpose(0, 2, 1) + np.eye(2)
-    balls: list[int] = []
-    expected: list[Expected] = []
+    found: list[tuple[Frame, int, Expected]] = []
     rejections: list[Rejected] = []
-    for b, ball in enumerate(rig.marker.balls):
-        if not np.isfinite(uv_px[b]).all() or depths[b] < NEAREST_M:
-            rejections.append(_rejected(Reason.BEHIND, f"{ball.name} is not before the camera", frame))
-            continue
-        radius_px = camera.focal_px * ball.radius_m / float(depths[b])
-        blob = _nearest_blob(frame, rig, b, uv_px[b], spreads[b], radius_px)
-        if isinstance(blob, Rejected):
-            rejections.append(blob)
-            continue
-        bearing = camera.bearings(blob.uv_px[None])[0]
-        u, v = blob.uv_px.tolist()
-        balls.append(b)
-        expected.append(Expected((u, v), radius_px, (0.0, 0.0), appearance.shades(camera, bearing)))
-    found = fit_centres(frame.image, expected, appearance.blurs[frame.camera]) if expected else []
+    for frame in frames:
+        for b, what in _expectations(frame, rig, state, appearance):
+            if isinstance(what, Rejected):
+                rejections.append(what)
+            else:
+                found.append((frame, b, what))
     fitted = []
-    for b, what, centre in zip(balls, expected, found, strict=True):
+    centres = fit_centres([frame.image for frame, _, _ in found], [what for _, _, what in found])
+    for (frame, b, what), centre in zip(found, centres, strict=True):
         if isinstance(centre, Reason):
             rejections.append(_rejected(centre, f"{rig.marker.balls[b].name} at {_at(what)}", frame))
             continue
         cov_px = frozen_array(centre.cov_px + floor_px**2 * np.eye(2))
-        fitted.append(Fitted(BallSighting(frame.camera, b, frame.t_ns, centre.uv_px, cov_px), what, centre))
+        fitted.append(Fitted(BallSighting(frame.camera, b, frame.t_ns, centre.uv_px, cov_px), frame, what, centre))
     return Look(tuple(fitted), tuple(rejections))
+
+
+def _expectations(
+    frame: Frame, rig: Rig, state: State, appearance: Appearance
+) -> Iterator[tuple[int, Expected | Rejected]]:
+    """Yield for each ball of the marker where its colour is seen near its prediction, or why it is not."""
+    camera = rig.cameras[frame.camera]
+    uv_px, H = predicted_pixels(state, camera, rig.marker, frame.t_ns)
+    depths = camera.in_camera(rig.marker.points_inB @ state.R_BtoW.T + state.p_BinW)[:, 2]
+    spreads = H @ state.P @ H.transpose(0, 2, 1) + np.eye(2)
+    for b, ball in enumerate(rig.marker.balls):
+        if not np.isfinite(uv_px[b]).all() or depths[b] < NEAREST_M:
+            yield b, _rejected(Reason.BEHIND, f"{ball.name} is not before the camera", frame)
+            continue
+        radius_px = camera.focal_px * ball.radius_m / float(depths[b])
+        blob = _nearest_blob(frame, rig, b, uv_px[b], spreads[b], radius_px)
+        if isinstance(blob, Rejected):
+            yield b, blob
+            continue
+        u, v = blob.uv_px.tolist()
+        shades = appearance.shades(camera, camera.bearings(blob.uv_px[None])[0])
+        yield b, Expected((u, v), radius_px, (0.0, 0.0), shades, appearance.blurs[frame.camera])
 
 
 def _nearest_blob(frame: Frame, rig: Rig, b: int, uv_px: Array, S: Array, radius_px: float) -> Blob | Rejected:

@@ -19,10 +19,10 @@ from scipy.stats import chi2
 from tracker import so3
 from tracker.acquire import first_state
 from tracker.appearance import Appearance
-from tracker.centre import Blur
 from tracker.detect import Blob
 from tracker.ekf import Update, predict, update
 from tracker.look import Fitted, look_everywhere, look_near
+from tracker.patch import Blur
 from tracker.rig import Rig
 from tracker.rounds import Rounds
 from tracker.state import State
@@ -147,28 +147,26 @@ class Tracker:
 
     def _see(self, frames: Round, ahead: State, harvest: _Harvest) -> Update | None:
         """Look where a predicted state expects the balls and update it, or return None."""
-        fitted: list[tuple[Frame, Fitted]] = []
-        for frame in frames:
-            look = look_near(frame, self._rig, ahead, self._appearance, self._tuning.pixel_noise_floor_px)
-            fitted += [(frame, one) for one in look.fitted]
-            harvest.rejections += look.rejections
-        result = self._update(ahead, tuple(one.sighting for _, one in fitted))
+        look = look_near(frames, self._rig, ahead, self._appearance, self._tuning.pixel_noise_floor_px)
+        harvest.rejections += look.rejections
+        result = self._update(ahead, tuple(one.sighting for one in look.fitted))
         if isinstance(result, Rejected):
             harvest.rejections.append(result)
             return None
         harvest.sightings += result.used
         harvest.rejections += result.rejected
-        self._learn([(frame, one) for frame, one in fitted if one.sighting in result.used])
+        self._learn([one for one in look.fitted if one.sighting in result.used])
         return result
 
-    def _learn(self, fitted: list[tuple[Frame, Fitted]]) -> None:
+    def _learn(self, fitted: list[Fitted]) -> None:
         """Learn how balls look: from every one at first, then from one in turn every few rounds."""
         self._turn += 1
         if self._appearance.light.count >= LEARN_ALL:
             fitted = [fitted[self._turn // LEARN_EVERY % len(fitted)]] if self._turn % LEARN_EVERY == 0 else []
-        for frame, one in fitted:
-            camera = self._rig.cameras[frame.camera]
-            self._appearance = self._appearance.learned(frame.image, camera, frame.camera, one.expected, one.centre)
+        for one in fitted:
+            index = one.frame.camera
+            camera, image = self._rig.cameras[index], one.frame.image
+            self._appearance = self._appearance.learned(image, camera, index, one.expected, one.centre)
 
     def _update(self, ahead: State, sightings: tuple[BallSighting, ...]) -> Update | Rejected:
         """Update a predicted state and remember it."""

@@ -8,14 +8,13 @@ pixel blur each. Drawn once per radius, blur and light on a fine grid, the image
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-
-from tracker.types import Array
 
 TERMS = 7
 """1, x, y, z, and x, y, z again where the lamp shines."""
@@ -50,10 +49,10 @@ def every_term(lamp: Vector) -> Shades:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Template:
-    """Shapes and their slopes by the centre's u and v and by the radius, on a grid of 1 / per_px pixel.
+    """Shapes on a grid of 1 / per_px pixel.
 
-    fine: (4, p, size, size): value, slope by u, by v, by the radius; then the shape; rows are v, columns u.
-    reach: the grid runs from -reach to reach pixels round the centre.  radius_px: of the ball drawn.
+    fine: (p, size, size), rows are v.  reach: the grid runs from -reach to reach pixels round the centre.
+    radius_px: of the ball drawn.
     """
 
     fine: NDArray[np.float32]
@@ -62,37 +61,50 @@ class Template:
     radius_px: float
 
     def at(self, u_steps: int, v_steps: int, half: int) -> NDArray[np.float32]:
-        """Return (4, p, m, m), m = 2 half + 1: the shapes at the pixels round a centre at (u, v) / per_px."""
+        """Return (p, m, m), m = 2 half + 1: the shapes at the pixels round a centre at (u, v) / per_px."""
         n = self.per_px
         left, top = (self.reach - half) * n - u_steps, (self.reach - half) * n - v_steps
         span = 2 * half * n + 1
-        return self.fine[:, :, top : top + span : n, left : left + span : n]
+        return self.fine[:, top : top + span : n, left : left + span : n]
+
+    def with_slopes(self, u_steps: int, v_steps: int, half: int) -> NDArray[np.float32]:
+        """Return (3, p, m, m): the shapes and their slopes by the centre's u and v [1/px]."""
+        drawn = np.empty((3, len(self.fine), 2 * half + 1, 2 * half + 1), dtype=np.float32)
+        drawn[0] = self.at(u_steps, v_steps, half)
+        np.subtract(self.at(u_steps + 1, v_steps, half), self.at(u_steps - 1, v_steps, half), out=drawn[1])
+        np.subtract(self.at(u_steps, v_steps + 1, half), self.at(u_steps, v_steps - 1, half), out=drawn[2])
+        drawn[1:] *= np.float32(self.per_px / 2.0)
+        return drawn
 
 
-def template_of(radius_px: float, blur_px: float, shades: Shades, reach: int) -> Template:
-    """Return the template of a ball; blur_px is one sigma of the lens's round kernel, the pixel's box comes on top."""
+def template_for(radius_px: float, blur_px: float, shades: Shades, half: int, streak_px: Streak) -> Template:
+    """Return the template of a ball, large enough for patches of 2 half + 1 pixels and the ball's streak.
+
+    blur_px: one sigma of the lens's round kernel; the pixel's box comes on top.
+    """
+    reach = half + 2 + (0 if _smears(streak_px)[0] == 1 else round(STREAK_MAX_PX / 2.0))
     return _draw(round(radius_px / RADIUS_STEP_PX), round(blur_px / BLUR_STEP_PX), shades, reach)
+
+
+def _smears(streak_px: Streak) -> tuple[int, float]:
+    """Return in how many places along a streak the ball is drawn, and by what factor the streak is shortened."""
+    length = math.hypot(*streak_px)
+    shrink = min(1.0, STREAK_MAX_PX / length) if length > 0.0 else 0.0
+    return math.ceil(2.0 * length * shrink) | 1, shrink
 
 
 @lru_cache(maxsize=256)
 def _draw(radius_steps: int, blur_steps: int, shades: Shades, reach: int) -> Template:
-    """Draw the shapes of a ball of a rounded radius and blur.
-
-    The slope by the radius is that of a picture blown up about its centre, blur included, which a percent more radius
-    does not show: d/dr = -(x d/dx + y d/dy) / r.
-    """
+    """Draw the shapes of a ball of a rounded radius and blur."""
     radius_px, blur_px = radius_steps * RADIUS_STEP_PX, blur_steps * BLUR_STEP_PX
     per_px = 8 if radius_px < 6.0 else 4
-    axis = (np.arange(-reach * per_px, reach * per_px + 1) / per_px).astype(np.float32)
+    size = 2 * reach * per_px + 1
     kernel = _kernel(per_px, blur_px)
-    fine = np.empty((4, len(shades.weights), len(axis), len(axis)), dtype=np.float32)
+    fine = np.empty((len(shades.weights), size, size), dtype=np.float32)
     for k, sharp in enumerate(_sharp(per_px, radius_px, shades)):
-        border = (len(axis) - len(sharp)) // 2
+        border = (size - len(sharp)) // 2
         padded = cv2.copyMakeBorder(sharp, border, border, border, border, cv2.BORDER_CONSTANT, value=(0.0,))
-        value = fine[0, k] = cv2.sepFilter2D(padded, -1, kernel, kernel, borderType=cv2.BORDER_CONSTANT)
-        fine[1, k] = -np.gradient(value, np.float32(1.0 / per_px), axis=1)
-        fine[2, k] = -np.gradient(value, np.float32(1.0 / per_px), axis=0)
-    fine[3] = (axis * fine[1] + axis[:, None] * fine[2]) / radius_px
+        fine[k] = cv2.sepFilter2D(padded, -1, kernel, kernel, borderType=cv2.BORDER_CONSTANT)
     fine.flags.writeable = False
     return Template(fine, per_px, reach, radius_px)
 
@@ -127,31 +139,35 @@ def _kernel(per_px: int, blur_px: float) -> NDArray[np.float32]:
 
 
 def sample(
-    radius_px: float, blur_px: float, shades: Shades, centre: tuple[float, float], half: int, streak_px: Streak
-) -> tuple[Array, Array]:
-    """Draw a ball's shapes at the template's grid point nearest a centre, smeared along a streak.
+    template: Template, radius_px: float, centre: tuple[float, float], half: int, streak_px: Streak
+) -> tuple[tuple[float, float], NDArray[np.float32]]:
+    """Read a template off at the grid point nearest a centre, smeared along a streak.
 
     Args:
-        radius_px, blur_px, shades: of the ball.
+        radius_px: the ball's, which the template's is rounded from; the rest is put right by the slope of a picture
+            blown up about its centre, d/dr = (x d/du + y d/dv) / r, since d/du = -d/dx; the blur grows with it, by a
+            percent.
         centre: (u, v) from the patch's middle pixel [px].
         half: the patch is (2 half + 1) pixels square.
         streak_px: how far the ball moves during the exposure [px].
     Returns:
-        centre (2,): the grid point, at most half a step off [px].
+        centre: the grid point, at most half a step off [px].
         shapes (3, p, m, m): value, slope by u, slope by v.
     """
-    length = float(np.hypot(*streak_px))
-    shrink = min(1.0, STREAK_MAX_PX / length) if length > 0.0 else 0.0
-    count = int(np.ceil(2.0 * length * shrink)) | 1
-    template = template_of(radius_px, blur_px, shades, half + 2 + (0 if count == 1 else round(STREAK_MAX_PX / 2.0)))
     n = template.per_px
     limit = 3 * n // 2  # a centre further from the middle pixel has run away
     ku, kv = (max(-limit, min(limit, round(c * n))) for c in centre)
-    total: NDArray[np.float32] = template.at(ku, kv, half)
-    if count > 1:
-        places = [((k + 0.5) / count - 0.5) * shrink for k in range(count)]
-        smears = [template.at(ku + round(t * streak_px[0] * n), kv + round(t * streak_px[1] * n), half) for t in places]
-        total = np.sum(smears, axis=0) / np.float32(count)
-    shapes = np.asarray(total[:3], dtype=np.float64)
-    shapes[0] += (radius_px - template.radius_px) * total[3]
-    return np.array([ku / n, kv / n]), shapes
+    count, shrink = _smears(streak_px)
+    if count == 1:
+        drawn = template.with_slopes(ku, kv, half)
+    else:
+        places = [((k + 0.5) / count - 0.5) * shrink * n for k in range(count)]
+        smears = [
+            template.with_slopes(ku + round(t * streak_px[0]), kv + round(t * streak_px[1]), half) for t in places
+        ]
+        drawn = np.sum(smears, axis=0) / np.float32(count)
+    share = np.float32((radius_px - template.radius_px) / template.radius_px)
+    axis = np.arange(-half, half + 1, dtype=np.float32) * share
+    u0, v0 = np.float32(ku / n) * share, np.float32(kv / n) * share
+    drawn[0] += (axis - u0) * drawn[1] + (axis - v0)[:, None] * drawn[2]
+    return (ku / n, kv / n), drawn

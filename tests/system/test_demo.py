@@ -1,0 +1,45 @@
+"""The demo, whole: rendered frames in, MAVLink over a real socket out, a helicopter that flies on nothing else."""
+
+from __future__ import annotations
+
+import io
+import itertools
+import json
+
+import cv2
+import pytest
+from rich.console import Console
+
+from tools.demo import LOG, PLOT, SUMMARY, VERDICT, DemoResult, run_demo
+from tools.request import Clocks, DemoRequest, Pace
+
+DURATION_S = 16.0
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> DemoResult:
+    """Fly once for all tests here, as fast as it goes."""
+    reading = itertools.count(1, 1000)
+    clocks = Clocks(lambda: next(reading), lambda: next(reading), lambda: 0, lambda _: None)
+    request = DemoRequest(DURATION_S, 1, tmp_path_factory.mktemp("demo"), Pace.FAST)
+    return run_demo(request, clocks, Console(file=io.StringIO()))
+
+
+def test_the_helicopter_holds_its_path_on_what_the_bridge_sends(result: DemoResult) -> None:
+    missed = [line for line in result.verdict.lines if not line.passed]
+    assert not missed
+
+
+def test_an_estimate_goes_out_for_every_pair_of_frames(result: DemoResult) -> None:
+    assert result.summary.estimates_sent >= 0.98 * 15 * DURATION_S
+    assert result.summary.lost == 0
+    assert result.summary.resets == 0
+
+
+def test_log_summary_verdict_and_picture_lie_in_the_folder(result: DemoResult) -> None:
+    assert (result.out / LOG).stat().st_size > 10_000
+    assert json.loads((result.out / SUMMARY).read_text())["estimates_sent"] == result.summary.estimates_sent
+    assert json.loads((result.out / VERDICT).read_text())["passed"] is True
+    picture = cv2.imread(str(result.out / PLOT))
+    assert picture is not None
+    assert picture.shape[1] > 1000

@@ -1,0 +1,99 @@
+"""`posebridge bench`: its commands and how their figures are shown."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import sys
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from bridge.settings import Settings
+from bridge.summary import Percentiles, to_text
+from tools.bench.accuracy import Accuracy, measure_accuracy
+from tools.bench.memory import measure_memory
+from tools.bench.speed import measure_speed
+from tools.request import Clocks
+
+WIDTH = 140  # of the accuracy table; a narrower terminal wraps it
+
+
+def bench_accuracy(recordings: list[Path], settings: Settings, clocks: Clocks, as_json: bool) -> None:
+    """Compare both methods with the truth of each recording."""
+    results = [
+        measure_accuracy(directory, _with_method(settings, method), clocks)
+        for directory in recordings
+        for method in ("ekf", "paper")
+    ]
+    if as_json:
+        _print_json([dataclasses.asdict(result) for result in results])
+        return
+    names = ("recording", "method", "poses", "mm mean", "sd", "max", "deg mean", "sd", "max", "roll", "pitch", "yaw")
+    table = Table(box=None, pad_edge=False)
+    for column in (*names, "NEES / 6", "95 % band"):
+        table.add_column(column, justify="left" if column in names[:2] else "right", no_wrap=True)
+    for result in results:
+        table.add_row(*_row(result))
+    console = Console()
+    Console(width=max(console.width, WIDTH)).print(table)
+
+
+def bench_speed(pairs: int, settings: Settings, clocks: Clocks, as_json: bool) -> None:
+    """Time tracking and acquisition."""
+    result = measure_speed(settings, clocks, pairs)
+    if as_json:
+        _print_json(_plain(dataclasses.asdict(result)))
+        return
+    console = Console()
+    console.print(f"{result.pairs} pairs tracked, {result.pairs_per_s:.0f} pairs/s on one core, link in memory")
+    console.print(f"track    {_percentiles(result.track_ms)}")
+    console.print(f"acquire  {_percentiles(result.acquire_ms)}")
+    console.print(to_text(result.run), soft_wrap=True)
+
+
+def bench_memory(pairs: int, settings: Settings, clocks: Clocks, as_json: bool) -> None:
+    """Watch the process's size over a long run."""
+    result = measure_memory(settings, clocks, pairs)
+    if as_json:
+        _print_json(dataclasses.asdict(result))
+        return
+    table = Table("pairs", "resident MB", box=None, pad_edge=False)
+    for done, size_mb in result.resident_mb.items():
+        table.add_row(str(done), f"{size_mb:.1f}")
+    console = Console()
+    console.print(table)
+    console.print(f"peak {result.peak_mb:.1f} MB, frames in memory included; log {result.log_mb:.1f} MB")
+
+
+def _with_method(settings: Settings, method: str) -> Settings:
+    return settings.model_copy(update={"tracker": settings.tracker.model_copy(update={"method": method})})
+
+
+def _row(result: Accuracy) -> list[str]:
+    low, high = result.nees_band
+    figures = [*dataclasses.astuple(result.position_mm), *dataclasses.astuple(result.attitude_deg)]
+    return [
+        result.recording,
+        result.method,
+        f"{result.estimates}/{result.pairs}",
+        *(f"{figure:.3f}" for figure in (*figures, *result.angles_deg)),
+        f"{result.nees / 6.0:.2f}",
+        f"{low / 6.0:.2f}..{high / 6.0:.2f}",
+    ]
+
+
+def _percentiles(spread: Percentiles) -> str:
+    if spread.p50 is None or spread.p99 is None or spread.max is None:
+        return "none"
+    return f"p50 {spread.p50:.2f} ms, p99 {spread.p99:.2f} ms, max {spread.max:.2f} ms a pair"
+
+
+def _plain(value: object) -> object:
+    """Return mappings of a dataclass as plain dicts."""
+    return json.loads(json.dumps(value, default=lambda mapping: dict(mapping)))
+
+
+def _print_json(value: object) -> None:
+    sys.stdout.write(json.dumps(value, indent=2) + "\n")

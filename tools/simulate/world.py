@@ -1,0 +1,128 @@
+"""Helicopter, wind, floor and autopilot in lockstep: the vehicle that a simulated source shows."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from bridge.ned import rotation_from_room
+from tools.simulate.autopilot import Autopilot, Mode
+from tools.simulate.control import PilotSticks
+from tools.simulate.helicopter import Helicopter, State, Sticks, standing, step
+from tools.simulate.mission import Mission, Phase
+from tools.simulate.wind import Wind
+from tracker import so3
+from tracker.sources.paths import Pose
+from tracker.types import Array
+
+STEP_NS = 2_500_000
+TICK_STEPS = 8
+_MEMORY_STEPS = 800
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """What is given: the room and how late the autopilot hears of it.
+
+    floor_z_m: the floor in W: the volume of 1.5 m height has the room's origin in its middle.
+    room_yaw_deg: heading of the room's x axis, as the bridge is told it [deg].
+    gust_m_s, gust_memory_s: light draught, one sigma, and how long a gust lasts.
+    delay_ns: from mid-exposure until the frame is with the tracker; the autopilot is told it as its vision delay.
+    """
+
+    floor_z_m: float = -0.75
+    room_yaw_deg: float = 0.0
+    gust_m_s: float = 0.05
+    gust_memory_s: float = 1.0
+    delay_ns: int = 30_000_000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Moment:
+    """One autopilot tick as it truly was. p_BinW, commanded_inW: (3,) [m]."""
+
+    t_ns: int
+    phase: Phase
+    mode: Mode
+    p_BinW: Array
+    R_BtoW: Array
+    commanded_inW: Array
+    commanded_yaw: float
+
+
+@dataclass(slots=True, eq=False)
+class World:
+    """A room in which time goes on only when asked.
+
+    `pose_at` simulates on to the time asked for: physics at 400 Hz, the autopilot at 50 Hz. Between two calls whatever
+    is sent to the autopilot's port waits there and is heard at its next tick. The seed sets the gusts; the same seed
+    and datagrams give the same flight.
+    """
+
+    mission: Mission
+    start_ns: int
+    surroundings: Surroundings = field(default_factory=Surroundings)
+    helicopter: Helicopter = field(default_factory=Helicopter)
+    seed: int = 0
+    history: list[Moment] = field(default_factory=list, init=False)
+    autopilot: Autopilot = field(init=False)
+    _wind: Wind = field(init=False)
+    _sticks: Sticks = field(default_factory=Sticks, init=False)
+    _states: deque[tuple[int, State]] = field(default_factory=lambda: deque(maxlen=_MEMORY_STEPS), init=False)
+    _steps: int = field(default=0, init=False)
+
+    def __post_init__(self) -> None:
+        """Stand the vehicle on the floor and switch the autopilot on."""
+        given = self.surroundings
+        room_yaw = math.radians(given.room_yaw_deg)
+        R_WtoN = rotation_from_room(room_yaw)
+        self.autopilot = Autopilot(lambda t_s: self.mission.reference_at(t_s).turned(R_WtoN, room_yaw), given.delay_ns)
+        self._wind = Wind(given.gust_m_s, given.gust_memory_s, STEP_NS / 1e9, np.random.default_rng((self.seed, 1)))
+        place = self.mission.ground_inW
+        self._states.append(
+            (self.start_ns, standing(self.helicopter, given.floor_z_m, (float(place[0]), float(place[1]))))
+        )
+
+    def pose_at(self, t_ns: int) -> Pose:
+        """Return the true pose at t_ns [ns], simulating on to it; before the start it stands."""
+        while self._states[-1][0] < t_ns:
+            self._advance()
+        back = min((self._states[-1][0] - t_ns) // STEP_NS, len(self._states) - 1)
+        later_ns, later = self._states[-1 - back]
+        if back + 1 >= len(self._states) or t_ns >= later_ns:
+            return later.p_BinW, later.R_BtoW
+        _, earlier = self._states[-2 - back]
+        share = 1.0 - (later_ns - t_ns) / STEP_NS
+        turn = so3.log(earlier.R_BtoW.T @ later.R_BtoW)
+        p_BinW = earlier.p_BinW + share * (later.p_BinW - earlier.p_BinW)
+        return p_BinW, earlier.R_BtoW @ so3.exp(share * turn)
+
+    def close(self) -> None:
+        """Let go of the autopilot's port."""
+        self.autopilot.close()
+
+    def _advance(self) -> None:
+        """Move on by one step of the physics."""
+        now_ns, state = self._states[-1]
+        if self._steps % TICK_STEPS == 0:
+            self._sticks = _wired(self.autopilot.tick(now_ns))
+            self._note(now_ns, state)
+        wind = self._wind.blow()
+        floor_z_m = self.surroundings.floor_z_m
+        self._steps += 1
+        self._states.append(
+            (now_ns + STEP_NS, step(self.helicopter, state, self._sticks, wind, floor_z_m, STEP_NS / 1e9))
+        )
+
+    def _note(self, now_ns: int, state: State) -> None:
+        pilot = self.autopilot
+        wanted = self.mission.reference_at(pilot.mission_s)
+        self.history.append(Moment(now_ns, wanted.phase, pilot.mode, state.p_BinW, state.R_BtoW, wanted.p, wanted.yaw))
+
+
+def _wired(pilot: PilotSticks) -> Sticks:
+    """Wire a pilot's sticks to the servos: the body's y is left and its z is up, so two of them turn about."""
+    return Sticks(pilot.right, -pilot.nose_up, -pilot.nose_right, pilot.up, pilot.motor)

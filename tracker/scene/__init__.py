@@ -1,0 +1,11 @@
+"""The simulated view: where the vehicle truly is -> what each camera's image holds.
+
+Nothing here is shared with the detector: colour is made by light, paint and sensor, not by a box in HSV, and an edge is
+ray-traced, not drawn as a circle.
+"""
+
+from tracker.scene.look import Look, Occluder, Trouble
+from tracker.scene.render import SceneRenderer
+from tracker.scene.vehicle import Pose
+
+__all__ = ["Look", "Occluder", "Pose", "SceneRenderer", "Trouble"]

@@ -1,0 +1,60 @@
+"""How the simulated room is lit and seen, and what may go wrong with it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """Light, lens and sensor of every simulated camera.
+
+    Values were set beside the lab recordings: balls of 5 to 6 px, noise of 2 to 3 levels of 255.
+    lamp_inW: direction towards the main lamp in the room, any length.
+    ambient, diffuse, specular: shares of light from everywhere, from the lamp, and mirrored by the paint.
+    blur_px: one sigma of the lens's point spread [px].
+    exposure_s: time the shutter is open [s].  sub_exposures: instants it is split into; 1 freezes the motion.
+    full_well_e: electrons of a white pixel; their square root is the shot noise.
+    read_noise: one sigma of the read-out, as a share of white.
+    chroma_noise: share of the noise's deviation that is not common to the three channels, 0..1.
+    jpeg_quality: 1..100 for a JPEG round trip with chroma at half size, as USB cameras give; 0 for none.
+    """
+
+    lamp_inW: tuple[float, float, float] = (0.35, -0.25, 0.9)
+    ambient: float = 0.42
+    diffuse: float = 0.80
+    specular: float = 0.15
+    blur_px: float = 0.5
+    exposure_s: float = 0.004
+    sub_exposures: int = 5
+    full_well_e: float = 3000.0
+    read_noise: float = 0.0010
+    chroma_noise: float = 0.5
+    jpeg_quality: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Occluder:
+    """A flat thing held before one camera: an upright rectangle in its image [px] and its colour."""
+
+    camera: int
+    u_px: int
+    v_px: int
+    width_px: int
+    height_px: int
+    bgr: tuple[int, int, int] = (60, 60, 60)
+
+
+@dataclass(frozen=True, slots=True)
+class Trouble:
+    """What spoils a picture on purpose.
+
+    light_gain: factor on all light; 0.2 is a blind drawn, 2 a lamp switched on.
+    occluders: things held before the cameras.
+    """
+
+    light_gain: float = 1.0
+    occluders: tuple[Occluder, ...] = ()
+
+
+NO_TROUBLE = Trouble()
