@@ -32,7 +32,7 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print the figures as J
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line and exit: 0 done, 1 a demo that did not hold its path, 2 something the operator can mend, 130 interrupted."""
+    """Run the command line and exit: 0 done, 1 demo failed, 2 something the operator can mend, 130 interrupted."""
     sys.exit(run_command_line(sys.argv[1:] if arguments is None else arguments))
 
 

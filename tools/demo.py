@@ -79,7 +79,7 @@ def run_demo(request: DemoRequest, clocks: Clocks, console: Console | None = Non
             world.autopilot.mode is Mode.LANDED,
         )
     result = DemoResult(flight, judge(flight), summary, request.out)
-    _leave(result, request, console)
+    _leave(result, request)
     if witness.seen is not None:
         step = witness.seen.step
         draw_seen(witness.seen.frames, step.sightings, step.estimates[0], witness.rig, request.out / SEEN)
@@ -196,7 +196,7 @@ def _make_folder(out: Path) -> None:
         raise OperatorError(f"--out {out}: cannot be made ({error.strerror}); name another folder") from error
 
 
-def _leave(result: DemoResult, request: DemoRequest, console: Console) -> None:
+def _leave(result: DemoResult, request: DemoRequest) -> None:
     """Write the files and show the figures."""
     write_summary(request.out / SUMMARY, result.summary)
     (request.out / VERDICT).write_text(result.verdict.to_json(), encoding="utf-8")

@@ -56,21 +56,21 @@ def update(state: State, sightings: tuple[BallSighting, ...], rig: Rig, probabil
     Returns:
         Update; Rejected FRAME_GATE when what is left does not fit the prediction.
     Source: each ball is gated on its innovation (Mahalanobis distance, 2 degrees of freedom). The rest is fitted
-        together; while the sum of squares does not fit its chi-square, the ball that the fit explains worst is left
+        together; while the sum of squares does not fit its chi-square, the ball without which it falls most is left
         out and the fit made again, as long as two are left. The prior is broad against a pixel, so it is the
         marker's rigid shape that finds the liar.
     """
     kept, rejected = _gated(state, sightings, rig, probability)
     while kept:
-        filter_, dx, leftover = _iterated(state, kept, rig)
+        filter_, dx, gains = _iterated(state, kept, rig)
         nis = float(filter_.mahalanobis) ** 2
         if nis <= float(chi2.ppf(probability, 2 * len(kept))):
             return Update(_posterior(state, dx, filter_.P), nis, 2 * len(kept), tuple(kept), tuple(rejected))
         if len(kept) <= MIN_BALLS_AFTER_REJECTION:
             detail = f"NIS {nis:.0f} with {2 * len(kept)} degrees of freedom"
             return Rejected(Reason.FRAME_GATE, detail, state.t_ns)
-        worst = int(np.argmax(leftover))
-        rejected.append(_gate_rejection(kept.pop(worst), rig, leftover[worst], "after the fit"))
+        worst = int(np.argmax(gains))
+        rejected.append(_gate_rejection(kept.pop(worst), rig, float(gains[worst]), "from what the others say"))
     return Rejected(Reason.FRAME_GATE, "no sighting near the prediction", state.t_ns)
 
 
@@ -103,8 +103,8 @@ def _iterated(state: State, sightings: list[BallSighting], rig: Rig) -> tuple[Ex
     """Iterate the update about the newest estimate until it stands.
 
     Returns:
-        The filter after its last update, the error dx (12,) against `state`, and each sighting's squared residual in
-        units of its own covariance (n,).
+        The filter after its last update, the error dx (12,) against `state`, and by how much the sum of squares
+        would fall without each sighting (n,).
     Source: iterated EKF, Bell and Cathey, IEEE Trans. Automatic Control 38 (1993): with H at the newest estimate and
         dx its distance from the prior, the linear update's innovation is z - h + H dx (3). By the multiplicative
         attitude, d/d dx = H diag(I, J_r(theta), I, I) (4).
@@ -122,9 +122,23 @@ def _iterated(state: State, sightings: list[BallSighting], rig: Rig) -> tuple[Ex
         dx = new
         if float(step.max()) < CONVERGED_SIGMA:
             break
-    residual = (innovation - H @ dx).reshape(-1, 2)
-    leftover = np.array([r @ np.linalg.solve(s.cov_px, r) for r, s in zip(residual, sightings, strict=True)])
-    return filter_, dx, leftover
+    return filter_, dx, _gains_without(innovation - H @ dx, R, H @ filter_.P @ H.T)
+
+
+def _gains_without(residual: Array, R: Array, explained: Array) -> Array:
+    """Return for each sighting by how much the sum of squares falls when it is left out (n,).
+
+    Args:
+        residual: (2n,) after the fit.  R, explained: (2n, 2n) of the measurements and of the fitted pixels.
+    Source: the residual's covariance is R - H P H'; its 2 x 2 block W on the diagonal makes r' W^-1 r that fall
+        (Baarda, "A testing procedure for use in geodetic networks", 1968, for blocks).
+    """
+    gains = np.empty(len(residual) // 2)
+    for i in range(len(gains)):
+        block = slice(2 * i, 2 * i + 2)
+        W = R[block, block] * (1.0 + 1e-6) - explained[block, block]
+        gains[i] = residual[block] @ np.linalg.solve(W, residual[block])
+    return gains
 
 
 def _posterior(prior: State, dx: Array, P: Array) -> State:

@@ -117,9 +117,15 @@ class Tracker:
     def _take_round(self, frames: Round, harvest: _Harvest) -> None:
         """Follow the track through a round, or look for the marker in it, and say where it is."""
         started_ns = self._stopwatch()
+        t_ns = max(frame.t_ns for frame in frames)
+        if self._past and t_ns < self._past[0].after.t_ns:
+            harvest.rejections += [_late(frame) for frame in frames]
+            return
         found = self._follow(frames, harvest) if self._track is TrackState.TRACKING else None
-        if found is None:
-            found = self._search(frames, harvest)
+        newest = not self._past or t_ns >= self._past[-1].after.t_ns
+        if newest and (found is None or 2 * len(found.used) < len(frames) * len(self._rig.marker)):
+            # The few balls where the track expects them may be something else: look whether the marker is elsewhere.
+            found = self._search(frames, harvest) or found
         if found is None or found.state.t_ns <= self._sent_ns:
             return
         available_ns = max(frame.available_ns for frame in frames)
@@ -131,12 +137,8 @@ class Tracker:
         """Update the track with a round; a late one is put in where it belongs and what came after is done again."""
         t_ns = max(frame.t_ns for frame in frames)
         later: list[_Past] = []
-        while self._past and self._past[-1].after.t_ns > t_ns:
+        while self._past[-1].after.t_ns > t_ns:
             later.insert(0, self._past.pop())
-        if not self._past:
-            self._past.extend(later)
-            harvest.rejections += [_late(frame) for frame in frames]
-            return None
         ahead = predict(self._past[-1].after, t_ns, self._tuning.process)
         result = self._see(frames, ahead, harvest)
         for past in later:

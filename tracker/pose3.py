@@ -51,12 +51,15 @@ def pose(points_inW: Array, marker: Marker) -> tuple[Array, Array] | Rejected:
     """Return (p_BinW, R_BtoW) of the marker whose balls stand at points_inW (n, 3).
 
     The first three balls give the attitude, all of them the position. The marker's own axes may differ from the
-    three points' axes: both are expressed by the same three points.
+    three points' axes: both are expressed by the same three points, taken in the order in which they turn to the left
+    about the body's z, so that a level vehicle has a level triangle and not one upside down.
     """
-    in_room = attitude(points_inW[0], points_inW[1], points_inW[2])
+    p1, p2, p3 = marker.points_inB[:3]
+    order = [0, 1, 2] if np.cross(p2 - p1, p3 - p1)[2] >= 0.0 else [1, 0, 2]
+    in_room = attitude(*points_inW[order])
     if isinstance(in_room, Rejected):
         return in_room
-    in_body = attitude(marker.points_inB[0], marker.points_inB[1], marker.points_inB[2])
+    in_body = attitude(*marker.points_inB[order])
     if isinstance(in_body, Rejected):
         return in_body
     R_BtoW = so3.from_euler(*in_room) @ so3.from_euler(*in_body).T

@@ -25,6 +25,7 @@ class MemoryLink:
         """Keep the message's frame."""
         if not self._open:
             self._ledger.dropped()
+            self._ledger.down("closed")
             return
         raw = self._ledger.frame(message)
         self.frames.append(raw)

@@ -42,7 +42,6 @@ def refusal(*arguments: str | Path) -> str:
     [
         ([], "Missing command"),
         (["fly"], "No such command 'fly'"),
-        (["run"], "Missing option '--config'"),
         (["run", "--config"], "Option '--config' requires an argument"),
         (["run", "--config", "lab", "--sauce", "x"], "No such option: --sauce"),
         (["run", "--config", "lab", "--pace", "slow"], "Invalid value for '--pace': Value error, 'slow' is not one of"),
@@ -62,7 +61,7 @@ def test_wrong_usage_is_one_line_that_points_to_the_help(arguments: list[str], c
 
 @pytest.mark.parametrize("duration_s", ["0", "-3", "nan", "inf", "1e9"])
 def test_a_demo_of_no_sensible_length_is_refused(duration_s: str) -> None:
-    assert "s must be 1 to 3600 s" in refusal("demo", f"--duration_s={duration_s}")
+    assert "s must be 15 to 3600 s" in refusal("demo", f"--duration_s={duration_s}")
 
 
 def test_a_demo_with_a_negative_seed_is_refused() -> None:

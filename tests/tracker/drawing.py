@@ -1,0 +1,79 @@
+"""Images of painted balls, drawn pixel by pixel and apart from the product's own renderer."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+
+from tests.tracker.rigs import at
+from tracker.camera import Camera
+from tracker.rig import Ball, Rig
+from tracker.state import State
+from tracker.types import Array, Frame, Image
+
+FINE = 8  # samples a pixel along each axis
+ROOM_BGR = (96.0, 90.0, 84.0)
+LIGHT_inC = np.array([-0.4, -0.6, -0.69])
+AMBIENT = 0.45
+
+
+def frame(
+    truth: State,
+    rig: Rig,
+    camera: int,
+    t_ns: int,
+    hidden: Collection[int] = (),
+    noise: tuple[float, np.random.Generator] | None = None,
+) -> Frame:
+    """Take a picture of a vehicle that keeps its velocity and rate.
+
+    hidden: balls that are not there.  noise: one sigma in grey levels, and its source.
+    """
+    then = at(truth, t_ns)
+    view = rig.cameras[camera]
+    canvas = empty_canvas(view)
+    points_inW = rig.marker.points_inB @ then.R_BtoW.T + then.p_BinW
+    depths_m = (points_inW - view.p_CinW) @ view.R_CtoW[:, 2]
+    for b, ball in enumerate(rig.marker.balls):
+        if b not in hidden and depths_m[b] > 0:
+            uv_px = view.project(points_inW[b : b + 1])[0][0]
+            draw_ball(canvas, uv_px, view.focal_px * ball.radius_m / depths_m[b], ball)
+    return Frame(camera, t_ns, developed(canvas, noise), available_ns=t_ns)
+
+
+def empty_canvas(view: Camera) -> Array:
+    """Return a grey wall, brighter to the right, (height, width, 3)."""
+    slope = np.linspace(-12.0, 12.0, view.width_px)[None, :, None]
+    return np.asarray(np.broadcast_to(np.array(ROOM_BGR) + slope, (view.height_px, view.width_px, 3)).copy())
+
+
+def draw_ball(canvas: Array, uv_px: Array, radius_px: float, ball: Ball) -> None:
+    """Put a matt ball on the canvas, each pixel the mean of FINE x FINE samples."""
+    half = int(np.ceil(radius_px)) + 2
+    left, top = np.floor(uv_px).astype(int) - half
+    size = 2 * half + 2
+    fine = (np.arange(size * FINE) + 0.5) / FINE - 0.5  # sample positions from the first pixel's centre
+    x = (fine[None, :] + left - uv_px[0]) / radius_px
+    y = (fine[:, None] + top - uv_px[1]) / radius_px
+    inside = x * x + y * y < 1.0
+    towards = np.sqrt(np.maximum(0.0, 1.0 - x * x - y * y))
+    lit = np.maximum(0.0, x * LIGHT_inC[0] + y * LIGHT_inC[1] - towards * LIGHT_inC[2])
+    shade = (AMBIENT + (1.0 - AMBIENT) * lit) * inside
+    coverage, light = (a.reshape(size, FINE, size, FINE).mean(axis=(1, 3)) for a in (inside.astype(float), shade))
+    height, width = canvas.shape[:2]
+    rows, columns = slice(max(0, top), min(height, top + size)), slice(max(0, left), min(width, left + size))
+    cut = slice(rows.start - top, rows.stop - top), slice(columns.start - left, columns.stop - left)
+    if rows.start >= rows.stop or columns.start >= columns.stop:
+        return
+    part = canvas[rows, columns]
+    part *= 1.0 - coverage[cut][..., None]
+    part += light[cut][..., None] * np.array(ball.colour.bgr)
+
+
+def developed(canvas: Array, noise: tuple[float, np.random.Generator] | None = None) -> Image:
+    """Return the canvas as an 8-bit image, with sensor noise if wanted."""
+    if noise is not None:
+        sigma, rng = noise
+        canvas = canvas + sigma * rng.standard_normal(canvas.shape, dtype=np.float32)
+    return np.clip(np.rint(canvas), 0, 255).astype(np.uint8)
