@@ -15,12 +15,14 @@ from scipy.stats import chi2
 from tracker import so3
 from tracker.measure import predicted_pixels
 from tracker.rig import Rig
-from tracker.state import ATTITUDE, Process, State, coasted, process_noise, transition
+from tracker.state import ATTITUDE, POSITION, Process, State, coasted, process_noise, transition
 from tracker.types import Array, BallSighting, Reason, Rejected
 
 MAX_ITERATIONS = 8
 CONVERGED_SIGMA = 0.02  # stop when the last step is this small against the posterior's own sigma
 MIN_BALLS_AFTER_REJECTION = 2
+LEAST_OPEN_TURN_RAD = 0.01
+BEND_SHARE = 0.2  # of a sighting's sigma: less does not matter
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,11 +60,15 @@ def update(state: State, sightings: tuple[BallSighting, ...], rig: Rig, probabil
     Source: each ball is gated on its innovation (Mahalanobis distance, 2 degrees of freedom). The rest is fitted
         together; while the sum of squares does not fit its chi-square, the ball without which it falls most is left
         out and the fit made again, as long as two are left. The prior is broad against a pixel, so it is the
-        marker's rigid shape that finds the liar.
+        marker's rigid shape that finds the liar. Where the fit leaves a turn so open that its curvature shows, the
+        curvature goes into the measurement's covariance and the fit is made again (`_bend`).
     """
     kept, rejected = _gated(state, sightings, rig, probability)
     while kept:
-        filter_, dx, gains = _iterated(state, kept, rig)
+        filter_, dx, gains = _iterated(state, kept, rig, None)
+        bend_px = _bend(state.moved(dx), filter_.P, kept, rig)
+        if bend_px is not None:
+            filter_, dx, gains = _iterated(state, kept, rig, bend_px)
         nis = float(filter_.mahalanobis) ** 2
         if nis <= float(chi2.ppf(probability, 2 * len(kept))):
             return Update(_posterior(state, dx, filter_.P), nis, 2 * len(kept), tuple(kept), tuple(rejected))
@@ -99,9 +105,13 @@ def _gate_rejection(sighting: BallSighting, rig: Rig, distance2: float, where: s
     return Rejected(Reason.GATE, f"{name}: {np.sqrt(distance2):.1f} sigma {where}", sighting.t_ns, sighting.camera)
 
 
-def _iterated(state: State, sightings: list[BallSighting], rig: Rig) -> tuple[ExtendedKalmanFilter, Array, Array]:
+def _iterated(
+    state: State, sightings: list[BallSighting], rig: Rig, bend_px: Array | None
+) -> tuple[ExtendedKalmanFilter, Array, Array]:
     """Iterate the update about the newest estimate until it stands.
 
+    Args:
+        bend_px: (2n,) one more error of all sightings together, one sigma, or None.
     Returns:
         The filter after its last update, the error dx (12,) against `state`, and by how much the sum of squares
         would fall without each sighting (n,).
@@ -114,6 +124,8 @@ def _iterated(state: State, sightings: list[BallSighting], rig: Rig) -> tuple[Ex
     for _ in range(MAX_ITERATIONS):
         z, h, H, R = _stacked(state.moved(dx), sightings, rig)
         H[:, ATTITUDE] = H[:, ATTITUDE] @ so3.right_jacobian(dx[ATTITUDE])  # (4)
+        if bend_px is not None:
+            R += np.outer(bend_px, bend_px)
         innovation = z - h + H @ dx  # (3)
         filter_ = _filter(state.P, size)
         filter_.update(innovation[:, None], lambda _x, H=H: H, lambda _x, n=size: np.zeros((n, 1)), R=R)
@@ -123,6 +135,29 @@ def _iterated(state: State, sightings: list[BallSighting], rig: Rig) -> tuple[Ex
         if float(step.max()) < CONVERGED_SIGMA:
             break
     return filter_, dx, _gains_without(innovation - H @ dx, R, H @ filter_.P @ H.T)
+
+
+def _bend(state: State, P: Array, sightings: list[BallSighting], rig: Rig) -> Array | None:
+    """Return how far a turn that the fit left open bends the balls' paths from straight (2n,) [px], or None if little.
+
+    Two balls do not show a turn about their line. Linearised, a ball off that line moves square to its arm; truly it
+    moves on a circle, which a filter that believes its tangent takes for knowledge of the arm's direction.
+
+    Source: turned by phi about the unit axis e, the arm m goes to second order by phi^2/2 (e (e.m) - m). For phi
+        normal with variance s, E[phi^4] = 3 s^2, so the rms of that is sqrt(3)/2 s |...|, the mean counted in. s, e:
+        the largest eigenvalue of the attitude's covariance and its vector.
+    """
+    variances, axes = np.linalg.eigh(P[ATTITUDE, ATTITUDE])
+    largest, axis = float(variances[2]), axes[:, 2]
+    if largest < LEAST_OPEN_TURN_RAD**2:
+        return None
+    arms = rig.marker.points_inB
+    sag_inW = (arms @ np.outer(axis, axis) - arms) * (largest * np.sqrt(3.0) / 2.0) @ state.R_BtoW.T
+    _, _, H, R = _stacked(state, sightings, rig)
+    balls = [sighting.ball for sighting in sightings]
+    J = H[:, POSITION].reshape(-1, 2, 3)
+    bend_px = np.asarray((J @ sag_inW[balls][:, :, None]).reshape(-1))
+    return bend_px if bool((np.abs(bend_px) > BEND_SHARE * np.sqrt(np.diag(R))).any()) else None
 
 
 def _gains_without(residual: Array, R: Array, explained: Array) -> Array:

@@ -41,6 +41,7 @@ from tracker.types import (
 
 HISTORY = 8  # updates that a late frame can be put in before
 RESETS = 256
+START_SHARE = 0.75  # of all balls in all cameras: fewer fit many places
 LEARN_ALL = 144  # balls; then
 LEARN_EVERY = 4  # rounds one ball
 
@@ -191,7 +192,7 @@ class Tracker:
         before = self._past[-1].after if self._past else None
         self._past.clear()
         found = self._see(tuple(frame for frame, _ in fresh.values()), start, harvest)
-        if found is None:
+        if found is None or len(found.used) < START_SHARE * len(fresh) * len(self._rig.marker):
             self._past.extend([_Past(before, ())] if before is not None else [])
             return None
         self._whole.clear()
