@@ -79,7 +79,8 @@ class StreamLink:
         posted = self._mailbox.put(message)
         if posted is Posted.REFUSED:
             self._ledger.dropped()
-            self._ledger.down("closed")
+            if self._closed:
+                self._ledger.down("closed")
             return
         if posted is Posted.REPLACED_OLDER:
             self._ledger.superseded()
