@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 
 from tracker.patch import PLANE, Blur, Expected, Patches
@@ -9,6 +12,8 @@ from tracker.template import BLUR_STEP_PX, Vector, every_term, sample, template_
 from tracker.types import Array
 
 BLUR_MAX_PX = 1.5
+EXPOSURE_TRIAL_S, EXPOSURE_STEP_S, EXPOSURE_MAX_S = 0.001, 0.00025, 0.02
+LEAST_STREAK_PX = 0.2  # a trial that moves the ball's ends by less shows nothing
 
 
 def sharper(patches: Patches, ball: Expected, centre: Array, step_px: float) -> Blur:
@@ -17,14 +22,29 @@ def sharper(patches: Patches, ball: Expected, centre: Array, step_px: float) -> 
     Args:
         centre: (2,) fitted centre from the patch's middle pixel [px].
     """
-    moved = []
-    for z, now_px in zip(patches.z[0], (ball.blur.luma_px, ball.blur.chroma_px), strict=True):
-        less, more = (
-            _misfit(patches, ball, centre, z, blur_px)
-            for blur_px in (max(0.0, now_px - BLUR_STEP_PX), now_px + BLUR_STEP_PX)
-        )
-        moved.append(min(BLUR_MAX_PX, max(0.0, now_px + (-step_px if less < more else step_px))))
-    return Blur(*moved)
+    now = ball.blur
+    luma, chroma = patches.z[0]
+
+    def tried(group: int, **change: float) -> float:
+        z = luma if group == 0 else chroma
+        changed = replace(ball, blur=replace(now, **change))
+        blur_px = changed.blur.luma_px if group == 0 else changed.blur.chroma_px
+        return _misfit(patches, changed, centre, z, blur_px)
+
+    less_luma = tried(0, luma_px=max(0.0, now.luma_px - BLUR_STEP_PX)) < tried(0, luma_px=now.luma_px + BLUR_STEP_PX)
+    less_chroma = tried(1, chroma_px=max(0.0, now.chroma_px - BLUR_STEP_PX)) < tried(
+        1, chroma_px=now.chroma_px + BLUR_STEP_PX
+    )
+    exposure_s = now.exposure_s
+    if math.hypot(*ball.speed_px_s) * EXPOSURE_TRIAL_S > LEAST_STREAK_PX:
+        shorter, longer = max(0.0, exposure_s - EXPOSURE_TRIAL_S), exposure_s + EXPOSURE_TRIAL_S
+        less = tried(0, exposure_s=shorter) < tried(0, exposure_s=longer)
+        exposure_s = min(EXPOSURE_MAX_S, max(0.0, exposure_s + (-EXPOSURE_STEP_S if less else EXPOSURE_STEP_S)))
+    return Blur(_stepped(now.luma_px, less_luma, step_px), _stepped(now.chroma_px, less_chroma, step_px), exposure_s)
+
+
+def _stepped(now_px: float, less: bool, step_px: float) -> float:
+    return min(BLUR_MAX_PX, max(0.0, now_px + (-step_px if less else step_px)))
 
 
 def _misfit(patches: Patches, ball: Expected, centre: Array, z: Array, blur_px: float) -> float:

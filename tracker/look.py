@@ -15,7 +15,7 @@ from tracker.detect import Blob, find_blobs, region_around
 from tracker.measure import predicted_pixels
 from tracker.patch import Expected
 from tracker.rig import Rig
-from tracker.state import State
+from tracker.state import ATTITUDE, POSITION, State
 from tracker.types import Array, BallSighting, Frame, Reason, Rejected, frozen_array
 
 REGION_SIGMA = 3.5
@@ -78,6 +78,7 @@ def _expectations(
     uv_px, H = predicted_pixels(state, camera, rig.marker, frame.t_ns)
     depths = camera.in_camera(rig.marker.points_inB @ state.R_BtoW.T + state.p_BinW)[:, 2]
     spreads = H @ state.P @ H.transpose(0, 2, 1) + np.eye(2)
+    speeds_px_s = H[:, :, POSITION] @ state.v_BinW + H[:, :, ATTITUDE] @ state.w_BinB
     for b, ball in enumerate(rig.marker.balls):
         if not np.isfinite(uv_px[b]).all() or depths[b] < NEAREST_M:
             yield b, _rejected(Reason.BEHIND, f"{ball.name} is not before the camera", frame)
@@ -89,7 +90,8 @@ def _expectations(
             continue
         u, v = blob.uv_px.tolist()
         shades = appearance.shades(camera, camera.bearings(blob.uv_px[None])[0])
-        yield b, Expected((u, v), radius_px, (0.0, 0.0), shades, appearance.blurs[frame.camera])
+        speed_px_s = float(speeds_px_s[b, 0]), float(speeds_px_s[b, 1])
+        yield b, Expected((u, v), radius_px, speed_px_s, shades, appearance.blurs[frame.camera])
 
 
 def _nearest_blob(frame: Frame, rig: Rig, b: int, uv_px: Array, S: Array, radius_px: float) -> Blob | Rejected:

@@ -20,10 +20,15 @@ _TO_YCC = np.array([[0.114, 0.587, 0.299], [0.5, -0.331264, -0.168736], [-0.0813
 
 @dataclass(frozen=True, slots=True)
 class Blur:
-    """How far a camera smears brightness and colour: one sigma of a round kernel, the pixel's box aside [px]."""
+    """How a camera smears.
+
+    luma_px, chroma_px: brightness and colour, one sigma of a round kernel, the pixel's box aside [px].
+    exposure_s: how long the shutter stands open [s].
+    """
 
     luma_px: float = 0.4
     chroma_px: float = 0.7
+    exposure_s: float = 0.004
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,14 +36,19 @@ class Expected:
     """What is known of a ball before its image is fitted.
 
     uv_px: centre within about a pixel.  radius_px: from its size and distance.
-    streak_px: how far it moves during the exposure.  shades: see `template.Shades`.  blur: its camera's.
+    speed_px_s: how fast its image moves.  shades: see `template.Shades`.  blur: its camera's.
     """
 
     uv_px: tuple[float, float]
     radius_px: float
-    streak_px: Streak
+    speed_px_s: tuple[float, float]
     shades: Shades
     blur: Blur
+
+    @property
+    def streak_px(self) -> Streak:
+        """Return how far its image moves during the exposure [px]."""
+        return self.speed_px_s[0] * self.blur.exposure_s, self.speed_px_s[1] * self.blur.exposure_s
 
 
 @dataclass(frozen=True, slots=True, eq=False)
