@@ -18,13 +18,14 @@ class Monitor:
     """Watch every turn of the loop.
 
     camera_names: names of the rig's cameras, for the frame counts.
-    state: the track's, after the newest step.
+    state: the track's, after the newest step.  last_rejection: what was left out last and why, "" for nothing.
     """
 
     def __init__(self, camera_names: tuple[str, ...]) -> None:
         self._names = camera_names
         self._frames: Counter[int] = Counter()
         self._rejected: Counter[str] = Counter()
+        self.last_rejection = ""
         self._latency = Histogram()
         self._stages: dict[str, Histogram] = {}
         self._recent: deque[int] = deque()
@@ -41,6 +42,8 @@ class Monitor:
         if isinstance(event, Frame):
             self._frames[event.camera] += 1
         self._rejected.update(rejected.reason.value for rejected in step.rejections)
+        if step.rejections:
+            self.last_rejection = f"{step.rejections[-1].reason.value}, {step.rejections[-1].detail}"
         self._lost += step.state is TrackState.LOST and self.state is not TrackState.LOST
         self.state = step.state
         for estimate in step.estimates:

@@ -9,14 +9,13 @@ from pathlib import Path
 from bridge.settings import ChosenRig, Settings, rig_of
 from bridge.settings.models import CameraSettings
 from tools.request import Clocks
-from tracker.errors import OperatorError
 from tracker.sources.live import LiveSource
 from tracker.sources.live_camera import LiveCamera
 from tracker.sources.paths import scripted_path
 from tracker.sources.protocol import Source
 from tracker.sources.recording import RecordingSource
 from tracker.sources.sim import START_NS, SimSource
-from tracker.sources.uri import EXAMPLES, SourceKind, SourceUri, parse_source
+from tracker.sources.uri import SourceKind, SourceUri, parse_source
 from tracker.sources.video import VideoSource
 
 
@@ -41,9 +40,6 @@ def open_source(text: str, settings: Settings, clocks: Clocks) -> OpenedSource:
         OperatorError: not a source, not there, or with cameras other than the rig's.
     """
     uri = parse_source(text)
-    if uri.kind not in _OPENERS:
-        known = ", ".join(EXAMPLES[kind] for kind in _OPENERS)
-        raise OperatorError(f"source {text}: `run` cannot read {uri.kind}: sources; give one of {known}")
     return _OPENERS[uri.kind](uri, settings, clocks)
 
 

@@ -19,10 +19,11 @@ from bridge.run import Outlets, Steps, close, run
 from bridge.settings import Settings
 from bridge.settings.tuning import tuning_of
 from bridge.status import StatusLine
-from bridge.summary import to_text
+from bridge.summary import Summary, to_text
 from tools.open_source import OpenedSource, open_source
 from tools.request import Clocks, Pace, RunRequest
 from tools.summary_file import check_summary_path, write_summary
+from tracker.errors import OperatorError
 from tracker.paper import PaperTracker
 from tracker.pipeline import Tracker
 from tracker.rig import Rig
@@ -53,21 +54,37 @@ def run_session(request: RunRequest, clocks: Clocks) -> None:
         status = None if request.quiet else stack.enter_context(StatusLine(console, clocks.stopwatch))
         outlets = Outlets(outlet, monitor, recorder, status)
         events, clock = _paced(opened, request.pace, clocks)
+        refused = False
         try:
             run(events, tracker_of(request.settings, opened.chosen.rig, clocks), clock, outlets)
+        except OperatorError:
+            refused = True  # its one line says it all
+            raise
         finally:
             close(clock, outlets)
             stack.close()
-            _report(outlets, request)
+            if not refused:
+                _report(outlets, request, console)
 
 
-def _report(outlets: Outlets, request: RunRequest) -> None:
-    """Give the run's figures, an interrupted one's too, on stdout."""
+def _report(outlets: Outlets, request: RunRequest, console: Console) -> None:
+    """Give the run's figures, an interrupted one's too, on stdout; what went wrong on stderr, quiet or not."""
     summary = outlets.summary(None if request.log is None else str(request.log))
     if not request.quiet:
         Console().print(to_text(summary), soft_wrap=True)
+    for trouble in _troubles(summary, outlets.monitor.last_rejection):
+        console.print(f"posebridge: warning: {trouble}", style="yellow", soft_wrap=True, highlight=False)
     if request.summary is not None:
         write_summary(request.summary, summary)
+
+
+def _troubles(summary: Summary, last_rejection: str) -> Iterator[str]:
+    """Yield what the operator must not miss, a line each."""
+    if summary.log is not None and summary.log.error:
+        yield summary.log.error
+    if not summary.estimates_sent:
+        why = f"; last: {last_rejection}" if last_rejection else ""
+        yield f"no pose was found in any frame{why}; check colours, marker and that T_BS is camera to room"
 
 
 def tracker_of(settings: Settings, rig: Rig, clocks: Clocks) -> Steps:

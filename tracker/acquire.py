@@ -45,6 +45,12 @@ def first_state(seen: Seen, rig: Rig, process: Process) -> State | Rejected:
     if isinstance(found, Rejected):
         return Rejected(found.reason, found.detail, newest_ns)
     p_BinW, R_BtoW = found
+    places = rig.marker.points_inB @ R_BtoW.T + p_BinW
+    for ball, point, place in zip(rig.marker.balls, chosen, places, strict=True):
+        miss_m = float(np.linalg.norm(point.p_inW - place))
+        if miss_m > slack_m + MISS_SIGMA * float(np.sqrt(np.trace(point.covariance))):
+            detail = f"{ball.name} stands {miss_m * 1e3:.0f} mm from its place on the marker: mirrored or mistaken"
+            return Rejected(Reason.GEOMETRY, detail, newest_ns)
     sigma = np.empty(12)
     sigma[POSITION] = START_POSITION_M + slack_m
     sigma[ATTITUDE] = START_ATTITUDE_RAD

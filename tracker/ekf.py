@@ -7,6 +7,7 @@ sightings, each at its own camera's time. Nothing is stored between calls: a sta
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
@@ -20,9 +21,20 @@ from tracker.types import Array, BallSighting, Reason, Rejected
 
 MAX_ITERATIONS = 8
 CONVERGED_SIGMA = 0.02  # stop when the last step is this small against the posterior's own sigma
-MIN_BALLS_AFTER_REJECTION = 2
+MAX_SUSPECTS = 8
 LEAST_OPEN_TURN_RAD = 0.01
 BEND_SHARE = 0.2  # of a sighting's sigma: less does not matter
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Fit:
+    """A fit: the error dx (12,) found, its covariance P (12, 12), the normalised innovation squared, and by how much
+    the sum of squares would fall without each sighting (n,)."""
+
+    dx: Array
+    P: Array
+    nis: float
+    gains: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,28 +68,48 @@ def update(state: State, sightings: tuple[BallSighting, ...], rig: Rig, probabil
         state: predicted to about the sightings' time.
         probability: of a true sighting to pass each gate.
     Returns:
-        Update; Rejected FRAME_GATE when what is left does not fit the prediction.
+        Update; Rejected FRAME_GATE when no choice of sightings fits the prediction.
     Source: each ball is gated on its innovation (Mahalanobis distance, 2 degrees of freedom). The rest is fitted
-        together; while the sum of squares does not fit its chi-square, the ball without which it falls most is left
-        out and the fit made again, as long as two are left. The prior is broad against a pixel, so it is the
-        marker's rigid shape that finds the liar. Where the fit leaves a turn so open that its curvature shows, the
-        curvature goes into the measurement's covariance and the fit is made again (`_bend`).
+        together. When the sum of squares does not fit its chi-square, the smallest set of sightings is left out with
+        which it does, of equal sets the one that leaves least; sets of up to a third of all are tried, among those
+        without which the sum would fall most. The prior is broad against a pixel, so it is the marker's rigid shape
+        that finds the liars. Where a fit leaves a turn so open that its curvature shows, the curvature goes into the
+        measurement's covariance and the fit is made again (`_bend`).
     """
-    kept, rejected = _gated(state, sightings, rig, probability)
-    while kept:
-        filter_, dx, gains = _iterated(state, kept, rig, None)
-        bend_px = _bend(state.moved(dx), filter_.P, kept, rig)
-        if bend_px is not None:
-            filter_, dx, gains = _iterated(state, kept, rig, bend_px)
-        nis = float(filter_.mahalanobis) ** 2
-        if nis <= float(chi2.ppf(probability, 2 * len(kept))):
-            return Update(_posterior(state, dx, filter_.P), nis, 2 * len(kept), tuple(kept), tuple(rejected))
-        if len(kept) <= MIN_BALLS_AFTER_REJECTION:
-            detail = f"NIS {nis:.0f} with {2 * len(kept)} degrees of freedom"
-            return Rejected(Reason.FRAME_GATE, detail, state.t_ns)
-        worst = int(np.argmax(gains))
-        rejected.append(_gate_rejection(kept.pop(worst), rig, float(gains[worst]), "from what the others say"))
-    return Rejected(Reason.FRAME_GATE, "no sighting near the prediction", state.t_ns)
+    near, rejected = _gated(state, sightings, rig, probability)
+    if not near:
+        return Rejected(Reason.FRAME_GATE, "no sighting near the prediction", state.t_ns)
+    whole = _fit(state, near, rig)
+    if whole is None:
+        return Rejected(Reason.FRAME_GATE, "the fit runs away", state.t_ns)
+    best, liars = whole, tuple[int, ...]()
+    suspects = np.argsort(-whole.gains)[:MAX_SUSPECTS].tolist()
+    for count in range(1, len(near) // 3 + 1):
+        if _fits(best, probability):
+            break
+        for left_out in combinations(suspects, count):
+            fit = _fit(state, [s for i, s in enumerate(near) if i not in left_out], rig)
+            if fit is not None and _fits(fit, probability) and not (_fits(best, probability) and best.nis <= fit.nis):
+                best, liars = fit, left_out
+    if not _fits(best, probability):
+        return Rejected(Reason.FRAME_GATE, f"NIS {whole.nis:.0f} with {2 * len(near)} degrees of freedom", state.t_ns)
+    rejected += [_gate_rejection(near[i], rig, float(whole.gains[i]), "from what the others say") for i in liars]
+    kept = tuple(s for i, s in enumerate(near) if i not in liars)
+    return Update(_posterior(state, best.dx, best.P), best.nis, 2 * len(kept), kept, tuple(rejected))
+
+
+def _fits(fit: _Fit, probability: float) -> bool:
+    """Say whether a fit's sum of squares is one that true sightings have."""
+    return fit.nis <= float(chi2.ppf(probability, 2 * len(fit.gains)))
+
+
+def _fit(state: State, sightings: list[BallSighting], rig: Rig) -> _Fit | None:
+    """Fit sightings, twice where the first fit leaves a turn open; None when the fit runs away."""
+    fit = _iterated(state, sightings, rig, None)
+    if fit is None:
+        return None
+    bend_px = _bend(state.moved(fit.dx), fit.P, sightings, rig)
+    return fit if bend_px is None else _iterated(state, sightings, rig, bend_px)
 
 
 def _gated(
@@ -105,16 +137,13 @@ def _gate_rejection(sighting: BallSighting, rig: Rig, distance2: float, where: s
     return Rejected(Reason.GATE, f"{name}: {np.sqrt(distance2):.1f} sigma {where}", sighting.t_ns, sighting.camera)
 
 
-def _iterated(
-    state: State, sightings: list[BallSighting], rig: Rig, bend_px: Array | None
-) -> tuple[ExtendedKalmanFilter, Array, Array]:
+def _iterated(state: State, sightings: list[BallSighting], rig: Rig, bend_px: Array | None) -> _Fit | None:
     """Iterate the update about the newest estimate until it stands.
 
     Args:
         bend_px: (2n,) one more error of all sightings together, one sigma, or None.
     Returns:
-        The filter after its last update, the error dx (12,) against `state`, and by how much the sum of squares
-        would fall without each sighting (n,).
+        The fit; None when it takes a ball behind a camera.
     Source: iterated EKF, Bell and Cathey, IEEE Trans. Automatic Control 38 (1993): with H at the newest estimate and
         dx its distance from the prior, the linear update's innovation is z - h + H dx (3). By the multiplicative
         attitude, d/d dx = H diag(I, J_r(theta), I, I) (4).
@@ -123,6 +152,8 @@ def _iterated(
     size = 2 * len(sightings)
     for _ in range(MAX_ITERATIONS):
         z, h, H, R = _stacked(state.moved(dx), sightings, rig)
+        if not np.isfinite(h).all():
+            return None
         H[:, ATTITUDE] = H[:, ATTITUDE] @ so3.right_jacobian(dx[ATTITUDE])  # (4)
         if bend_px is not None:
             R += np.outer(bend_px, bend_px)
@@ -134,7 +165,8 @@ def _iterated(
         dx = new
         if float(step.max()) < CONVERGED_SIGMA:
             break
-    return filter_, dx, _gains_without(innovation - H @ dx, R, H @ filter_.P @ H.T)
+    gains = _gains_without(innovation - H @ dx, R, H @ filter_.P @ H.T)
+    return _Fit(dx, filter_.P, float(filter_.mahalanobis) ** 2, gains)
 
 
 def _bend(state: State, P: Array, sightings: list[BallSighting], rig: Rig) -> Array | None:

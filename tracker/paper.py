@@ -9,6 +9,7 @@ import numpy as np
 
 from tracker import so3
 from tracker.acquire import CENTROID_SIGMA_PX
+from tracker.associate import associate
 from tracker.detect import Blob
 from tracker.look import look_everywhere
 from tracker.pose3 import pose
@@ -96,6 +97,9 @@ class PaperTracker:
                 name = self._rig.marker.balls[ball].name
                 return Rejected(point.reason, f"{name}: {point.detail}", t_ns)
             points.append(point)
+        chosen = associate([[point] for point in points], self._rig.marker, 0.0)
+        if isinstance(chosen, Rejected):
+            return Rejected(chosen.reason, chosen.detail, t_ns)
         places = np.stack([point.p_inW for point in points])
         found = pose(places, self._rig.marker)
         if isinstance(found, Rejected):

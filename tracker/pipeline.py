@@ -8,6 +8,7 @@ It reads no clock but the stopwatch it is given, and touches no file and no devi
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -32,6 +33,7 @@ from tracker.types import (
     Estimate,
     Event,
     Frame,
+    Image,
     Reason,
     Rejected,
     Step,
@@ -41,7 +43,7 @@ from tracker.types import (
 
 HISTORY = 8  # updates that a late frame can be put in before
 RESETS = 256
-START_SHARE = 0.75  # of all balls in all cameras: fewer fit many places
+GLANCE = 16  # rows compared at first sight of a repeated image
 LEARN_ALL = 144  # balls; then
 LEARN_EVERY = 4  # rounds one ball
 
@@ -80,6 +82,7 @@ class Tracker:
         self._turn = 0
         self._past: deque[_Past] = deque(maxlen=HISTORY)
         self._whole: dict[int, tuple[Frame, list[list[Blob]]]] = {}
+        self._last_images: dict[int, Image] = {}
         self._track = TrackState.SEARCHING
         self._resets = 0
         self._sent_ns = -(2**63)
@@ -89,11 +92,13 @@ class Tracker:
         harvest = _Harvest()
         if isinstance(event, Rejected):
             harvest.rejections.append(event)
-        elif isinstance(event, Frame) and (wrong := self._wrong_size(event)):
-            harvest.rejections.append(wrong)
         else:
-            for frames in self._rounds.take(event):
-                self._take_round(frames, harvest)
+            unfit = self._unfit(event) if isinstance(event, Frame) else None
+            if unfit is not None:
+                harvest.rejections.append(unfit)
+            else:
+                for frames in self._rounds.take(event):
+                    self._take_round(frames, harvest)
             self._watch_the_time(event.t_ns)
         return self._step(harvest)
 
@@ -107,13 +112,20 @@ class Tracker:
     def _step(self, harvest: _Harvest) -> Step:
         return Step(self._track, tuple(harvest.sightings), tuple(harvest.rejections), tuple(harvest.estimates))
 
-    def _wrong_size(self, frame: Frame) -> Rejected | None:
+    def _unfit(self, frame: Frame) -> Rejected | None:
+        """Say why a frame cannot be used: the wrong size, or an image that its camera has given just before."""
         camera = self._rig.cameras[frame.camera]
         height, width = frame.image.shape[:2]
-        if (width, height) == (camera.width_px, camera.height_px):
+        if (width, height) != (camera.width_px, camera.height_px):
+            detail = f"{camera.name}: {width} x {height} px, calibrated for {camera.width_px} x {camera.height_px}"
+            return Rejected(Reason.WRONG_SIZE, detail, frame.t_ns, frame.camera)
+        last = self._last_images.get(frame.camera)
+        self._last_images[frame.camera] = frame.image
+        if last is None or not np.array_equal(last[::GLANCE], frame.image[::GLANCE]):
             return None
-        detail = f"{camera.name}: {width} x {height} px, calibrated for {camera.width_px} x {camera.height_px}"
-        return Rejected(Reason.WRONG_SIZE, detail, frame.t_ns, frame.camera)
+        if not np.array_equal(last, frame.image):
+            return None
+        return Rejected(Reason.REPEATED, f"{camera.name} gives the same image again", frame.t_ns, frame.camera)
 
     def _take_round(self, frames: Round, harvest: _Harvest) -> None:
         """Follow the track through a round, or look for the marker in it, and say where it is."""
@@ -174,6 +186,10 @@ class Tracker:
     def _update(self, ahead: State, sightings: tuple[BallSighting, ...]) -> Update | Rejected:
         """Update a predicted state and remember it."""
         result = update(ahead, sightings, self._rig, self._tuning.gate_probability)
+        if isinstance(result, Update) and (tilt := _tilt_rad(result.state)) > self._tuning.tilt_limit_rad:
+            limit_deg = math.degrees(self._tuning.tilt_limit_rad)
+            detail = f"the pose leans {math.degrees(tilt):.0f} deg, limit {limit_deg:.0f} deg: mirrored or mistaken"
+            return Rejected(Reason.GEOMETRY, detail, ahead.t_ns)
         if isinstance(result, Update):
             self._past.append(_Past(result.state, result.used))
         return result
@@ -189,17 +205,24 @@ class Tracker:
         if isinstance(start, Rejected):
             harvest.rejections.append(start)
             return None
-        before = self._past[-1].after if self._past else None
+        old = tuple(self._past)
         self._past.clear()
         found = self._see(tuple(frame for frame, _ in fresh.values()), start, harvest)
-        if found is None or len(found.used) < START_SHARE * len(fresh) * len(self._rig.marker):
-            self._past.extend([_Past(before, ())] if before is not None else [])
+        if found is None or not self._all_seen_twice(found):
+            self._past = deque(old, maxlen=HISTORY)
+            harvest.rejections.append(Rejected(Reason.GEOMETRY, "not every ball fits in two cameras", newest_ns))
             return None
         self._whole.clear()
+        before = old[-1].after if old else None
         if before is not None and self._jumped(before, found.state):
             self._resets = (self._resets + 1) % RESETS
         self._track = TrackState.TRACKING
         return found
+
+    def _all_seen_twice(self, found: Update) -> bool:
+        """Say whether a start is borne out by every ball in two cameras: less fits many places."""
+        cameras = [{s.camera for s in found.used if s.ball == ball} for ball in range(len(self._rig.marker))]
+        return all(len(seen) >= 2 for seen in cameras)
 
     def _jumped(self, before: State, found: State) -> bool:
         """Say whether a pose found again is none that the old track can have led to."""
@@ -231,6 +254,11 @@ class Tracker:
             available_ns=available_ns,
             stages_ns=MappingProxyType(stages),
         )
+
+
+def _tilt_rad(state: State) -> float:
+    """Return the angle between the body's z and the room's [rad]."""
+    return math.acos(max(-1.0, min(1.0, float(state.R_BtoW[2, 2]))))
 
 
 def _late(frame: Frame) -> Rejected:

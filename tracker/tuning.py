@@ -16,6 +16,7 @@ class Tuning:
     pixel_noise_floor_px: one sigma of what the ball's model leaves unexplained.
     sync_window_ns: frames this close in time are one instant.
     coast_limit_ns: without a sighting for longer the track is lost.
+    tilt_limit_rad: no vehicle that flies leans further; a pose that does is a mistake, such as a mirrored marker.
     continuity_limit_ns: a track lost for longer cannot claim to be the same on return, whatever its prediction says.
     """
 
@@ -25,3 +26,4 @@ class Tuning:
     sync_window_ns: int
     coast_limit_ns: int
     continuity_limit_ns: int
+    tilt_limit_rad: float

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from tracker.errors import OperatorError
 
-FORMS = "udpout:HOST:PORT, udpin:HOST:PORT, serial:DEVICE:BAUD, tcp:HOST:PORT, memory:[NAME]"
+FORMS = "udpout:HOST:PORT, udpin:HOST:PORT, serial:DEVICE:BAUD, tcp:HOST:PORT"
 _NUMBERED = ("udpout", "udpin", "serial", "tcp")
 
 

@@ -126,6 +126,7 @@ class TrackerSettings(Section):
     method: Literal["ekf", "paper"] = "ekf"
     coast_limit_ms: Positive = 200.0
     continuity_limit_ms: Positive = 1000.0
+    tilt_limit_deg: Annotated[float, Strict(), Field(gt=0, le=180)] = 60.0
     sync_window_ms: NotNegative = 4.0
     gate_probability: Annotated[float, Strict(), Field(gt=0, lt=1)] = 0.999
     pixel_noise_floor_px: Positive = 0.1

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from bridge.settings.models import TrackerSettings
 from tracker.state import Process
 from tracker.tuning import Tuning
@@ -25,4 +27,5 @@ def tuning_of(settings: TrackerSettings) -> Tuning:
         sync_window_ns=round(settings.sync_window_ms * NS_PER_MS),
         coast_limit_ns=round(settings.coast_limit_ms * NS_PER_MS),
         continuity_limit_ns=round(settings.continuity_limit_ms * NS_PER_MS),
+        tilt_limit_rad=math.radians(settings.tilt_limit_deg),
     )

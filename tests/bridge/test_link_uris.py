@@ -45,7 +45,7 @@ def test_a_link_uri_names_a_transport_a_place_and_a_number(uri: str, address: tu
 )
 def test_an_unknown_form_is_answered_with_the_known_ones(uri: str) -> None:
     line = refusal(uri)
-    for form in ("udpout:HOST:PORT", "udpin:HOST:PORT", "serial:DEVICE:BAUD", "tcp:HOST:PORT", "memory:"):
+    for form in ("udpout:HOST:PORT", "udpin:HOST:PORT", "serial:DEVICE:BAUD", "tcp:HOST:PORT"):
         assert form in line
 
 

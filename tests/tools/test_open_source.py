@@ -63,7 +63,6 @@ def test_a_recording_is_seen_by_its_own_calibration(recording: Path) -> None:
         ("video:a.mp4,b.mp4", "video a.mp4: no such file"),
         ("video:a,b,c", "rig: 2 cameras (nominal) but the source has 3"),
         ("camera:0,0", "camera"),
-        ("remote:", "source remote:: `run` cannot read remote: sources; give one of recording:DIR"),
     ],
 )
 def test_a_source_that_cannot_be_had_is_refused_in_one_line(uri: str, complaint: str) -> None:

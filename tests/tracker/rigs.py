@@ -29,6 +29,7 @@ TUNING = Tuning(
     sync_window_ns=4_000_000,
     coast_limit_ns=200_000_000,
     continuity_limit_ns=1_000_000_000,
+    tilt_limit_rad=np.radians(60.0),
 )
 
 

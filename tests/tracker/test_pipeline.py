@@ -27,8 +27,9 @@ def tracker() -> Tracker:
 
 
 def pair(k: int, truth: State = FLYING) -> list[Event]:
+    """Take a picture with each camera; a little noise, for no camera gives the very same image twice."""
     t_ns = START_NS + k * PERIOD_NS
-    return [frame(truth, RIG, camera, t_ns) for camera in (0, 1)]
+    return [frame(truth, RIG, c, t_ns, noise=(0.5, np.random.default_rng((k, c)))) for c in (0, 1)]
 
 
 def flight(numbers: Iterable[int], truth: State = FLYING) -> list[Event]:

@@ -15,8 +15,6 @@ class SourceKind(StrEnum):
     VIDEO = "video"
     CAMERA = "camera"
     SIM = "sim"
-    LOG = "log"
-    REMOTE = "remote"
 
 
 EXAMPLES = {
@@ -24,10 +22,8 @@ EXAMPLES = {
     SourceKind.VIDEO: "video:LEFT.mp4,RIGHT.mp4",
     SourceKind.CAMERA: "camera:0,1",
     SourceKind.SIM: "sim:NAME",
-    SourceKind.LOG: "log:FILE.mcap",
-    SourceKind.REMOTE: "remote:",
 }
-_NEEDS_ARGUMENT = frozenset({SourceKind.RECORDING, SourceKind.VIDEO, SourceKind.LOG})
+_NEEDS_ARGUMENT = frozenset({SourceKind.RECORDING, SourceKind.VIDEO})
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,7 +47,7 @@ def parse_source(text: str) -> SourceUri:
     """Read a source URI.
 
     Args:
-        text: such as "recording:DIR"; `camera:`, `sim:` and `remote:` may stand without an argument.
+        text: such as "recording:DIR"; `camera:` and `sim:` may stand without an argument.
     Raises:
         OperatorError: no colon, an unknown kind, or a kind that needs an argument without one.
     """

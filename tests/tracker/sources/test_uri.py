@@ -18,8 +18,6 @@ from tracker.sources.uri import SourceKind, parse_source
         ("camera:v4l2src ! a,b=1 ! appsink; 1", SourceKind.CAMERA, ("v4l2src ! a,b=1 ! appsink", "1")),
         ("camera:", SourceKind.CAMERA, ()),
         ("sim:hover", SourceKind.SIM, ("hover",)),
-        ("log:flight.mcap", SourceKind.LOG, ("flight.mcap",)),
-        ("remote:", SourceKind.REMOTE, ()),
     ],
 )
 def test_a_source_is_a_kind_and_its_items(text: str, kind: SourceKind, items: tuple[str, ...]) -> None:
@@ -36,7 +34,6 @@ def test_a_source_is_a_kind_and_its_items(text: str, kind: SourceKind, items: tu
         ("record:lab", "unknown kind 'record'"),
         ("recording:", "write recording:DIR"),
         ("video: ", "write video:LEFT.mp4,RIGHT.mp4"),
-        ("log:", "write log:FILE.mcap"),
         ("", "no kind"),
     ],
 )
