@@ -9,7 +9,6 @@ It reads no clock but the stopwatch it is given, and touches no file and no devi
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -22,6 +21,8 @@ from tracker.acquire import first_state
 from tracker.appearance import Appearance
 from tracker.detect import Blob
 from tracker.ekf import Update, predict, update
+from tracker.history import History
+from tracker.intake import Intake
 from tracker.look import Fitted, look_everywhere, look_near
 from tracker.patch import Blur
 from tracker.rig import Rig
@@ -33,7 +34,6 @@ from tracker.types import (
     Estimate,
     Event,
     Frame,
-    Image,
     Reason,
     Rejected,
     Step,
@@ -41,21 +41,11 @@ from tracker.types import (
     frozen_array,
 )
 
-HISTORY = 8  # updates that a late frame can be put in before
 RESETS = 256
-GLANCE = 16  # rows compared at first sight of a repeated image
 LEARN_ALL = 144  # balls; then
 LEARN_EVERY = 4  # rounds one ball
 
 Round = tuple[Frame, ...]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Past:
-    """One update of the filter: the state after it and the sightings that made it."""
-
-    after: State
-    sightings: tuple[BallSighting, ...]
 
 
 @dataclass(slots=True, eq=False)
@@ -77,12 +67,12 @@ class Tracker:
         self._rig = rig
         self._tuning = tuning
         self._stopwatch = stopwatch
+        self._intake = Intake(rig)
         self._rounds = Rounds(len(rig.cameras), tuning.sync_window_ns)
         self._appearance = Appearance(tuple(Blur() for _ in rig.cameras))
         self._turn = 0
-        self._past: deque[_Past] = deque(maxlen=HISTORY)
+        self._history = History()
         self._whole: dict[int, tuple[Frame, list[list[Blob]]]] = {}
-        self._last_images: dict[int, Image] = {}
         self._track = TrackState.SEARCHING
         self._resets = 0
         self._sent_ns = -(2**63)
@@ -93,9 +83,9 @@ class Tracker:
         if isinstance(event, Rejected):
             harvest.rejections.append(event)
         else:
-            unfit = self._unfit(event) if isinstance(event, Frame) else None
-            if unfit is not None:
-                harvest.rejections.append(unfit)
+            refused = self._intake.refuse(event) if isinstance(event, Frame) else None
+            if refused is not None:
+                harvest.rejections.append(refused)
             else:
                 for frames in self._rounds.take(event):
                     self._take_round(frames, harvest)
@@ -112,33 +102,19 @@ class Tracker:
     def _step(self, harvest: _Harvest) -> Step:
         return Step(self._track, tuple(harvest.sightings), tuple(harvest.rejections), tuple(harvest.estimates))
 
-    def _unfit(self, frame: Frame) -> Rejected | None:
-        """Say why a frame cannot be used: the wrong size, or an image that its camera has given just before."""
-        camera = self._rig.cameras[frame.camera]
-        height, width = frame.image.shape[:2]
-        if (width, height) != (camera.width_px, camera.height_px):
-            detail = f"{camera.name}: {width} x {height} px, calibrated for {camera.width_px} x {camera.height_px}"
-            return Rejected(Reason.WRONG_SIZE, detail, frame.t_ns, frame.camera)
-        last = self._last_images.get(frame.camera)
-        self._last_images[frame.camera] = frame.image
-        if last is None or not np.array_equal(last[::GLANCE], frame.image[::GLANCE]):
-            return None
-        if not np.array_equal(last, frame.image):
-            return None
-        return Rejected(Reason.REPEATED, f"{camera.name} gives the same image again", frame.t_ns, frame.camera)
-
     def _take_round(self, frames: Round, harvest: _Harvest) -> None:
         """Follow the track through a round, or look for the marker in it, and say where it is."""
         started_ns = self._stopwatch()
         t_ns = max(frame.t_ns for frame in frames)
-        if self._past and t_ns < self._past[0].after.t_ns:
+        if self._history.forgot(t_ns):
             harvest.rejections += [_late(frame) for frame in frames]
             return
-        found = self._follow(frames, harvest) if self._track is TrackState.TRACKING else None
-        newest = not self._past or t_ns >= self._past[-1].after.t_ns
-        if newest and (found is None or 2 * len(found.used) < len(frames) * len(self._rig.marker)):
+        before = self._history.newest
+        found = self._follow(frames, t_ns, harvest) if self._track is TrackState.TRACKING else None
+        if before is None or t_ns >= before.t_ns:
+            few = found is None or 2 * len(found.used) < len(frames) * len(self._rig.marker)
             # The few balls where the track expects them may be something else: look whether the marker is elsewhere.
-            found = self._search(frames, harvest) or found
+            found = (self._search(frames, t_ns, harvest) if few else None) or found
         if found is None or found.state.t_ns <= self._sent_ns:
             return
         available_ns = max(frame.available_ns for frame in frames)
@@ -146,25 +122,36 @@ class Tracker:
         self._sent_ns = found.state.t_ns
         harvest.estimates.append(self._estimate(found, available_ns, stages))
 
-    def _follow(self, frames: Round, harvest: _Harvest) -> Update | None:
+    def _follow(self, frames: Round, t_ns: int, harvest: _Harvest) -> Update | None:
         """Update the track with a round; a late one is put in where it belongs and what came after is done again."""
-        t_ns = max(frame.t_ns for frame in frames)
-        later: list[_Past] = []
-        while self._past[-1].after.t_ns > t_ns:
-            later.insert(0, self._past.pop())
-        ahead = predict(self._past[-1].after, t_ns, self._tuning.process)
-        result = self._see(frames, ahead, harvest)
+        later = self._history.back_to(t_ns)
+        result = self._see(frames, self._ahead(t_ns), harvest)
+        if result is not None:
+            self._history.remember(result)
         for past in later:
-            start = self._past[-1].after
-            again = self._update(predict(start, past.after.t_ns, self._tuning.process), past.sightings)
-            result = again if isinstance(again, Update) else result
+            again = self._update(self._ahead(past.t_ns), past.sightings)
+            if isinstance(again, Update):
+                self._history.remember(again)
+                result = again
         return result
 
-    def _see(self, frames: Round, ahead: State, harvest: _Harvest) -> Update | None:
-        """Look where a predicted state expects the balls and update it, or return None."""
+    def _ahead(self, t_ns: int) -> State:
+        """Return the newest state carried on to an instant; there is one while tracking."""
+        newest = self._history.newest
+        if newest is None:
+            raise ValueError("nothing is tracked yet")
+        return predict(newest, t_ns, self._tuning.process)
+
+    def _see(self, frames: Round, ahead: State, harvest: _Harvest, *, start: bool = False) -> Update | None:
+        """Look where a predicted state expects the balls and update it, or return None.
+
+        start: the state is a first guess, which every ball must bear out.
+        """
         look = look_near(frames, self._rig, ahead, self._appearance, self._tuning.pixel_noise_floor_px)
         harvest.rejections += look.rejections
         result = self._update(ahead, tuple(one.sighting for one in look.fitted))
+        if isinstance(result, Update) and start and not self._all_seen_twice(result):
+            result = Rejected(Reason.GEOMETRY, "not every ball fits in two cameras", ahead.t_ns)
         if isinstance(result, Rejected):
             harvest.rejections.append(result)
             return None
@@ -184,38 +171,32 @@ class Tracker:
             self._appearance = self._appearance.learned(image, camera, index, one.expected, one.centre)
 
     def _update(self, ahead: State, sightings: tuple[BallSighting, ...]) -> Update | Rejected:
-        """Update a predicted state and remember it."""
+        """Update a predicted state, unless it comes to lean as no vehicle does."""
         result = update(ahead, sightings, self._rig, self._tuning.gate_probability)
         if isinstance(result, Update) and (tilt := _tilt_rad(result.state)) > self._tuning.tilt_limit_rad:
             limit_deg = math.degrees(self._tuning.tilt_limit_rad)
             detail = f"the pose leans {math.degrees(tilt):.0f} deg, limit {limit_deg:.0f} deg: mirrored or mistaken"
             return Rejected(Reason.GEOMETRY, detail, ahead.t_ns)
-        if isinstance(result, Update):
-            self._past.append(_Past(result.state, result.used))
         return result
 
-    def _search(self, frames: Round, harvest: _Harvest) -> Update | None:
+    def _search(self, frames: Round, t_ns: int, harvest: _Harvest) -> Update | None:
         """Look for the marker in whole frames, this round's and the other cameras' newest; start the track on it."""
         for frame in frames:
             camera = self._rig.cameras[frame.camera]
             self._whole[frame.camera] = (frame, look_everywhere(frame, camera, self._rig))
-        newest_ns = max(frame.t_ns for frame in frames)
-        fresh = {c: w for c, w in self._whole.items() if newest_ns - w[0].t_ns <= self._tuning.coast_limit_ns // 2}
+        fresh = {c: w for c, w in self._whole.items() if t_ns - w[0].t_ns <= self._tuning.coast_limit_ns // 2}
         start = first_state(fresh, self._rig, self._tuning.process)
         if isinstance(start, Rejected):
             harvest.rejections.append(start)
             return None
-        old = tuple(self._past)
-        self._past.clear()
-        found = self._see(tuple(frame for frame, _ in fresh.values()), start, harvest)
-        if found is None or not self._all_seen_twice(found):
-            self._past = deque(old, maxlen=HISTORY)
-            harvest.rejections.append(Rejected(Reason.GEOMETRY, "not every ball fits in two cameras", newest_ns))
+        found = self._see(tuple(frame for frame, _ in fresh.values()), start, harvest, start=True)
+        if found is None:
             return None
-        self._whole.clear()
-        before = old[-1].after if old else None
+        before = self._history.newest
         if before is not None and self._jumped(before, found.state):
             self._resets = (self._resets + 1) % RESETS
+        self._whole.clear()
+        self._history.restart(found)
         self._track = TrackState.TRACKING
         return found
 
@@ -235,7 +216,8 @@ class Tracker:
 
     def _watch_the_time(self, t_ns: int) -> None:
         """Lose the track when nothing of it was seen for too long."""
-        if self._track is TrackState.TRACKING and t_ns - self._past[-1].after.t_ns > self._tuning.coast_limit_ns:
+        newest = self._history.newest
+        if newest is not None and t_ns - newest.t_ns > self._tuning.coast_limit_ns:
             self._track = TrackState.LOST
 
     def _estimate(self, found: Update, available_ns: int, stages: dict[str, int]) -> Estimate:
