@@ -11,9 +11,9 @@ from itertools import combinations
 
 import numpy as np
 from filterpy.kalman import ExtendedKalmanFilter
-from scipy.stats import chi2
 
 from tracker import so3
+from tracker.gate import chi2_limit
 from tracker.measure import predicted_pixels
 from tracker.rig import Rig
 from tracker.state import ATTITUDE, POSITION, Process, State, coasted, process_noise, transition
@@ -100,7 +100,7 @@ def update(state: State, sightings: tuple[BallSighting, ...], rig: Rig, probabil
 
 def _fits(fit: _Fit, probability: float) -> bool:
     """Say whether a fit's sum of squares is one that true sightings have."""
-    return fit.nis <= float(chi2.ppf(probability, 2 * len(fit.gains)))
+    return fit.nis <= chi2_limit(probability, 2 * len(fit.gains))
 
 
 def _fit(state: State, sightings: list[BallSighting], rig: Rig) -> _Fit | None:
@@ -116,7 +116,7 @@ def _gated(
     state: State, sightings: tuple[BallSighting, ...], rig: Rig, probability: float
 ) -> tuple[list[BallSighting], list[Rejected]]:
     """Part sightings by their own Mahalanobis distance from the prediction."""
-    limit = float(chi2.ppf(probability, 2))
+    limit = chi2_limit(probability, 2)
     z, h, H, R = _stacked(state, sightings, rig)
     S = H @ state.P @ H.T + R
     kept, rejected = [], []

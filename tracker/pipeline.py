@@ -14,13 +14,13 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 
 import numpy as np
-from scipy.stats import chi2
 
 from tracker import so3
 from tracker.acquire import first_state
 from tracker.appearance import Appearance
 from tracker.detect import Blob
 from tracker.ekf import Update, predict, update
+from tracker.gate import chi2_limit
 from tracker.history import History
 from tracker.intake import Intake
 from tracker.look import Fitted, look_everywhere, look_near
@@ -212,7 +212,7 @@ class Tracker:
         ahead = predict(before, found.t_ns, self._tuning.process)
         error = np.concatenate((found.p_BinW - ahead.p_BinW, so3.log(ahead.R_BtoW.T @ found.R_BtoW)))
         distance2 = float(error @ np.linalg.solve((ahead.P + found.P)[:6, :6], error))
-        return distance2 > float(chi2.ppf(self._tuning.gate_probability, 6))
+        return distance2 > chi2_limit(self._tuning.gate_probability, 6)
 
     def _watch_the_time(self, t_ns: int) -> None:
         """Lose the track when nothing of it was seen for too long."""

@@ -20,12 +20,13 @@ from tracker.sources.recording import RecordingSource
 from tracker.types import Array, Estimate, Frame, Image, Reason, Step
 
 PAIRS = 60
-FIRST = 25  # the first spoilt pair: the track has settled
-SECOND = 15  # pairs
-LONG = 20
+FIRST = 25  # the first spoilt pair, unless the start is spoilt: the track has settled
+ONE, TWO, THREE = range(FIRST, FIRST + 1), range(FIRST, FIRST + 2), range(FIRST, FIRST + 3)
+SECOND, LONG = range(FIRST, FIRST + 15), range(FIRST, FIRST + 20)
+START = range(15)
 RESUME_NS = 300_000_000
 SIGMAS = 5.0
-YELLOW, GREEN, ORANGE = range(3)
+GREEN, ORANGE = 1, 2
 BOTH = (0, 1)
 
 
@@ -45,7 +46,7 @@ Spoiler = Callable[[Flight], list[Frame]]
 class Case:
     """One way of spoiling a flight.
 
-    pairs: how many pairs from FIRST on are spoilt.
+    spoilt: the pairs that are.
     least: estimates there must be at least; one for each pair that either camera shows as it was.
     blind: whether nothing can be seen meanwhile, so that nothing may be sent.
     resets: the reset counter at the end.
@@ -53,15 +54,10 @@ class Case:
 
     name: str
     spoil: Spoiler
-    pairs: int
+    spoilt: range
     least: int = PAIRS
     blind: bool = False
     resets: int = 0
-
-    @property
-    def spoilt(self) -> range:
-        """Return the spoilt pairs."""
-        return range(FIRST, FIRST + self.pairs)
 
 
 @pytest.fixture(scope="module")
@@ -74,13 +70,13 @@ def flight(lab_flight: Path) -> Flight:
     return Flight(frames, rig, read_ground_truth(lab_flight))
 
 
-def repainted(pairs: int, cameras: Iterable[int], paint: Callable[[Flight, int, Frame], Image]) -> Spoiler:
-    """Replace the images of some cameras in the spoilt pairs; `paint` gets the flight, the pair and the frame."""
+def repainted(spoilt: range, cameras: Iterable[int], paint: Callable[[Flight, int, Frame], Image]) -> Spoiler:
+    """Replace the images of some cameras in some pairs; `paint` gets the flight, the pair and the frame."""
     chosen = tuple(cameras)
 
     def spoil(flight: Flight) -> list[Frame]:
         frames = list(flight.frames)
-        for k in range(FIRST, FIRST + pairs):
+        for k in spoilt:
             for camera in chosen:
                 frame = frames[2 * k + camera]
                 frames[2 * k + camera] = replace(frame, image=paint(flight, k, frame))
@@ -94,7 +90,7 @@ def frozen(flight: Flight, _k: int, frame: Frame) -> Image:
 
 
 def of_another_time(flight: Flight, k: int, frame: Frame) -> Image:
-    return flight.frames[2 * (k + SECOND) + frame.camera].image
+    return flight.frames[2 * (k + len(SECOND)) + frame.camera].image
 
 
 def black(_flight: Flight, k: int, frame: Frame) -> Image:
@@ -134,8 +130,7 @@ def decoy(ball: int, aside_m: tuple[float, float, float]) -> Callable[[Flight, i
 def dropped(flight: Flight) -> list[Frame]:
     """Lose two of five frames of camera 1 for good."""
     gone = np.random.default_rng(1).random(PAIRS) < 0.4
-    in_doubt = range(FIRST, FIRST + LONG)
-    return [f for i, f in enumerate(flight.frames) if not (f.camera == 1 and i // 2 in in_doubt and gone[i // 2])]
+    return [f for i, f in enumerate(flight.frames) if not (f.camera == 1 and i // 2 in LONG and gone[i // 2])]
 
 
 def two_pairs_late(flight: Flight) -> list[Frame]:
@@ -145,23 +140,25 @@ def two_pairs_late(flight: Flight) -> list[Frame]:
     return frames
 
 
-HAND_M = (0.0, 0.0, 0.05)
+BESIDE_M = (0.0, 0.0, 0.018)  # the discs touch
 ARM_M = (0.15, -0.15, 0.2)
 CASES = [
     Case("camera 1 hangs for a second", repainted(SECOND, [1], frozen), SECOND),
-    Case("both hang for a second", repainted(SECOND, BOTH, frozen), SECOND, PAIRS - SECOND, blind=True, resets=1),
-    Case("colours swapped in one camera for one frame", repainted(1, [0], swapped), 1),
-    Case("colours swapped in both cameras for one frame", repainted(1, BOTH, swapped), 1, PAIRS - 1),
+    Case("both hang for a second", repainted(SECOND, BOTH, frozen), SECOND, PAIRS - 15, blind=True, resets=1),
+    Case("colours swapped in one camera for one frame", repainted(ONE, [0], swapped), ONE),
+    Case("colours swapped in both cameras for one frame", repainted(ONE, BOTH, swapped), ONE, PAIRS - 1),
     Case("colours swapped in one camera for 20 frames", repainted(LONG, [0], swapped), LONG),
-    Case("one frame of another time", repainted(1, [0], of_another_time), 1),
+    Case("one frame of another time", repainted(ONE, [0], of_another_time), ONE),
     Case("camera 1 black for a second", repainted(SECOND, [1], black), SECOND),
-    Case("both black for two frames", repainted(2, BOTH, black), 2, PAIRS - 2, blind=True),
+    Case("both black for two frames", repainted(TWO, BOTH, black), TWO, PAIRS - 2, blind=True),
     Case("frames of camera 1 dropped", dropped, LONG),
-    Case("a frame two pairs late", two_pairs_late, 3),
-    Case("a near decoy in one camera", repainted(SECOND, [0], decoy(GREEN, HAND_M)), SECOND),
-    Case("a near decoy in both cameras", repainted(SECOND, BOTH, decoy(GREEN, HAND_M)), SECOND),
+    Case("a frame two pairs late", two_pairs_late, THREE),
+    Case("a touching decoy in one camera", repainted(SECOND, [0], decoy(GREEN, BESIDE_M)), SECOND),
+    Case("a touching decoy in both cameras", repainted(SECOND, BOTH, decoy(GREEN, BESIDE_M)), SECOND),
     Case("a far decoy in one camera", repainted(SECOND, [1], decoy(ORANGE, ARM_M)), SECOND),
     Case("a far decoy in both cameras", repainted(SECOND, BOTH, decoy(ORANGE, ARM_M)), SECOND),
+    Case("a far decoy in one camera at the start", repainted(START, [1], decoy(ORANGE, ARM_M)), START),
+    Case("a far decoy in both cameras at the start", repainted(START, BOTH, decoy(ORANGE, ARM_M)), START),
     Case("half as bright in one camera", repainted(SECOND, [1], halved), SECOND),
 ]
 each_case = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name.replace(" ", "-"))
@@ -234,4 +231,4 @@ def test_nothing_is_sent_while_nothing_can_be_seen(case: Case, flight: Flight, s
 @pytest.mark.parametrize(("case", "cameras"), [(CASES[0], 1), (CASES[1], 2)], ids=["one", "both"])
 def test_every_frame_of_a_camera_that_hangs_is_counted(case: Case, cameras: int, steps_of: Flown) -> None:
     reasons = [rejected.reason for step in steps_of(case) for rejected in step.rejections]
-    assert reasons.count(Reason.REPEATED) == cameras * SECOND
+    assert reasons.count(Reason.REPEATED) == cameras * len(SECOND)
