@@ -20,7 +20,7 @@ from tracker.types import Array, Image, Reason, frozen_array
 
 TUKEY = 4.0
 LEAST_WEIGHT = 1e-3
-ITERATIONS = 3
+ITERATIONS = 4
 ROUGH_PX = 0.5
 CONVERGED_PX = 0.02  # of the last step; what is left after it is far smaller
 MAX_SHIFT_PX = 1.5
