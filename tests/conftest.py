@@ -4,10 +4,18 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import NoReturn
 
 import pytest
 
 REPOSITORY = Path(__file__).resolve().parent.parent
+
+
+def _lacking(what: str) -> NoReturn:
+    """Fail in CI, skip elsewhere, for a part that a test needs."""
+    if os.environ.get("CI") == "true":
+        pytest.fail(what)
+    pytest.skip(what)
 
 
 @pytest.fixture(scope="session")
@@ -19,10 +27,17 @@ def shared() -> Path:
     folder = Path(os.environ.get("POSEBRIDGE_SHARED", REPOSITORY.parent / "shared"))
     if not (folder / "recordings").is_dir():
         missing = f"no recordings in {folder}: set POSEBRIDGE_SHARED to the folder that holds `recordings`"
-        if os.environ.get("CI") == "true":
-            pytest.fail(missing)
-        pytest.skip(missing)
+        _lacking(missing)
     return folder
+
+
+@pytest.fixture(scope="session")
+def full_disk() -> Path:
+    """Return a file on a disk that is always full; one that is lacking fails in CI and skips on a user's machine."""
+    device = Path("/dev/full")
+    if not device.is_char_device():
+        _lacking(f"this system has no {device}")
+    return device
 
 
 @pytest.fixture(scope="session")

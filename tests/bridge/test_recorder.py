@@ -72,9 +72,8 @@ def test_a_disk_that_fills_up_ends_the_recording_but_not_the_flight(tmp_path: Pa
     assert len(estimate_times(path)) >= int(written) > 0
 
 
-@pytest.mark.skipif(not Path("/dev/full").is_char_device(), reason="this system has no /dev/full")
-def test_a_disk_full_from_the_start_is_told_at_once_and_steps_are_taken_all_the_same() -> None:
-    log = recorder(Path("/dev/full"))
+def test_a_disk_full_from_the_start_is_told_at_once_and_steps_are_taken_all_the_same(full_disk: Path) -> None:
+    log = recorder(full_disk)
     assert "No space left on device" in str(log.state().error)
     for one in turns(20):
         log.take(*one)

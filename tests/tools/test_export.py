@@ -112,10 +112,9 @@ def test_an_output_that_cannot_be_written_is_told_in_one_line(log: Path, tmp_pat
     assert set(tmp_path.iterdir()) == before
 
 
-@pytest.mark.skipif(not Path("/dev/full").is_char_device(), reason="this system has no /dev/full")
-def test_a_full_disk_is_told_in_one_line(log: Path) -> None:
+def test_a_full_disk_is_told_in_one_line(log: Path, full_disk: Path) -> None:
     with pytest.raises(OperatorError, match="No space left on device"):
-        export(log, "csv", Path("/dev/full"))
+        export(log, "csv", full_disk)
 
 
 def test_a_disk_that_fills_up_while_writing_leaves_no_half_export(log: Path, tmp_path: Path) -> None:

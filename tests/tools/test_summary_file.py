@@ -38,6 +38,6 @@ def test_a_device_takes_a_summary_without_being_replaced() -> None:
     check_summary_path(Path("/dev/null"))
 
 
-def test_a_full_disk_is_told_in_one_line() -> None:
+def test_a_full_disk_is_told_in_one_line(full_disk: Path) -> None:
     with pytest.raises(OperatorError, match="No space left on device"):
-        write_summary(Path("/dev/full"), Summary(3, 15.0))
+        write_summary(full_disk, Summary(3, 15.0))
