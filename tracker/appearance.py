@@ -11,13 +11,23 @@ from tracker.camera import Camera
 from tracker.centre import Centre
 from tracker.lesson import light_on, sharper
 from tracker.light import Light, ray_frame
-from tracker.patch import Blur, Expected, cut, patch_half
+from tracker.patch import Expected, Response, cut
 from tracker.template import FLAT, Shades
 from tracker.types import Array, Image
 
 BEARING_STEP_RAD = 0.07  # rays closer than this share a ball's shading
-PUBLISH_AT = (18, 36, 72, 144, 288)  # balls learned when templates follow the light, then every last of these
-BLUR_STEP_PX = 0.03
+PUBLISH_AT = (
+    6,
+    12,
+    18,
+    24,
+    30,
+    36,
+    72,
+    144,
+    288,
+)  # balls learned when templates follow the light, then every last of these
+BLUR_STEP_PX, FIRST_STEP_PX = 0.03, 0.15
 MISFIT_MAX = 2.0  # an image that fits no ball teaches nothing
 
 
@@ -26,10 +36,10 @@ class Appearance:
     """What is known so far.
 
     light: learned.  shown: the light that templates are drawn by; it follows `light` in few, growing steps.
-    blurs: of each camera.
+    responses: of each camera.
     """
 
-    blurs: tuple[Blur, ...]
+    responses: tuple[Response, ...]
     light: Light = field(default_factory=Light)
     shown: Light = field(default_factory=Light)
 
@@ -39,6 +49,24 @@ class Appearance:
             return FLAT
         x, y = (round(float(bearing_inC[i] / bearing_inC[2]) / BEARING_STEP_RAD) for i in (0, 1))
         return _shades(self.shown, camera, x, y)
+
+    @property
+    def gamma(self) -> float:
+        """Return the gamma that is taken for the cameras'."""
+        return self.responses[0].gamma
+
+    def with_gamma(self, gamma: float) -> Appearance:
+        """Return it under another gamma, its light ready to be learned anew."""
+        if gamma == self.gamma:
+            return self
+        responses = tuple(replace(response, gamma=gamma) for response in self.responses)
+        return replace(self, responses=responses, light=self.light.faded())
+
+    def expected_like(self, ball: Expected, camera: Camera, index: int, uv_px: Array) -> Expected:
+        """Return what would be expected of a ball, seen at uv_px (2,), if it looked as is known here."""
+        shades = self.shades(camera, camera.bearings(uv_px[None])[0])
+        place = float(uv_px[0]), float(uv_px[1])
+        return replace(ball, uv_px=place, shades=shades, response=self.responses[index])
 
     def learned(self, image: Image, camera: Camera, index: int, ball: Expected, found: Centre) -> Appearance:
         """Return what is known after one more ball.
@@ -50,15 +78,17 @@ class Appearance:
         """
         if found.misfit > MISFIT_MAX:
             return self
-        patches = cut([image], [ball], patch_half([ball]))
-        centre = found.uv_px - patches.middle[0]
-        blur = sharper(patches, ball, centre, BLUR_STEP_PX)
+        pixels = cut(image, ball)
+        centre = float(found.uv_px[0]) - ball.middle[0], float(found.uv_px[1]) - ball.middle[1]
+        response = sharper(pixels, ball, centre, max(BLUR_STEP_PX, FIRST_STEP_PX / (1.0 + self.light.count / 6.0)))
         R_RtoW = ray_frame(camera.bearings(found.uv_px[None])[0], camera.R_CtoW)
-        equations = light_on(patches, ball, centre, self.light.lamp_seen(R_RtoW))
+        equations = light_on(pixels, ball, centre, self.light.lamp_seen(R_RtoW))
         light = self.light if equations is None else self.light.learned(*equations, R_RtoW)
         due = light.count in PUBLISH_AT or light.count % PUBLISH_AT[-1] == 0
         shown = light if due and light.trusted else self.shown
-        return replace(self, blurs=(*self.blurs[:index], blur, *self.blurs[index + 1 :]), light=light, shown=shown)
+        return replace(
+            self, responses=(*self.responses[:index], response, *self.responses[index + 1 :]), light=light, shown=shown
+        )
 
 
 @lru_cache(maxsize=4096)

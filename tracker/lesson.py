@@ -1,4 +1,4 @@
-"""What one well-fitted ball teaches of the camera's blur and the room's light."""
+"""What one well-fitted ball teaches of the camera's response and the room's light."""
 
 from __future__ import annotations
 
@@ -7,80 +7,98 @@ from dataclasses import replace
 
 import numpy as np
 
-from tracker.patch import PLANE, Blur, Expected, Patches
-from tracker.template import BLUR_STEP_PX, Vector, every_term, sample, template_for
+from tracker.centre import misfit_at
+from tracker.compiled import compiled
+from tracker.patch import LUMA, TRUST, Expected, Response, X, Y
+from tracker.solve import eliminate
+from tracker.template import BLUR_STEP_PX, TERMS, Vector, every_term, places_along, read, template_for
 from tracker.types import Array
 
 BLUR_MAX_PX = 1.5
 EXPOSURE_TRIAL_S, EXPOSURE_STEP_S, EXPOSURE_MAX_S = 0.001, 0.00025, 0.02
 LEAST_STREAK_PX = 0.2  # a trial that moves the ball's ends by less shows nothing
+PLANE = 3
+LUMA_GROUP, CHROMA_GROUP = 0, 1
 
 
-def sharper(patches: Patches, ball: Expected, centre: Array, step_px: float) -> Blur:
-    """Return the camera's blur, moved one step to where the one ball of `patches` fits better.
+def sharper(pixels: Array, ball: Expected, centre: tuple[float, float], step_px: float) -> Response:
+    """Return the camera's response, its blurs and exposure moved one step to where the ball fits better.
 
     Args:
-        centre: (2,) fitted centre from the patch's middle pixel [px].
+        pixels: the ball's patch.
+        centre: as fitted, from the patch's middle pixel [px].
     """
-    now = ball.blur
-    luma, chroma = patches.z[0]
+    now, trial_px = ball.response, max(step_px, BLUR_STEP_PX)
 
     def tried(group: int, **change: float) -> float:
-        z = luma if group == 0 else chroma
-        changed = replace(ball, blur=replace(now, **change))
-        blur_px = changed.blur.luma_px if group == 0 else changed.blur.chroma_px
-        return _misfit(patches, changed, centre, z, blur_px)
+        changed = replace(ball, response=replace(now, **change))
+        return misfit_at(pixels, changed, centre, group)
 
-    less_luma = tried(0, luma_px=max(0.0, now.luma_px - BLUR_STEP_PX)) < tried(0, luma_px=now.luma_px + BLUR_STEP_PX)
-    less_chroma = tried(1, chroma_px=max(0.0, now.chroma_px - BLUR_STEP_PX)) < tried(
-        1, chroma_px=now.chroma_px + BLUR_STEP_PX
+    less_luma = tried(LUMA_GROUP, luma_px=max(0.0, now.luma_px - trial_px)) < tried(
+        LUMA_GROUP, luma_px=now.luma_px + trial_px
+    )
+    less_chroma = tried(CHROMA_GROUP, chroma_px=max(0.0, now.chroma_px - trial_px)) < tried(
+        CHROMA_GROUP, chroma_px=now.chroma_px + trial_px
     )
     exposure_s = now.exposure_s
     if math.hypot(*ball.speed_px_s) * EXPOSURE_TRIAL_S > LEAST_STREAK_PX:
         shorter, longer = max(0.0, exposure_s - EXPOSURE_TRIAL_S), exposure_s + EXPOSURE_TRIAL_S
-        less = tried(0, exposure_s=shorter) < tried(0, exposure_s=longer)
+        less = tried(LUMA_GROUP, exposure_s=shorter) < tried(LUMA_GROUP, exposure_s=longer)
         exposure_s = min(EXPOSURE_MAX_S, max(0.0, exposure_s + (-EXPOSURE_STEP_S if less else EXPOSURE_STEP_S)))
-    return Blur(_stepped(now.luma_px, less_luma, step_px), _stepped(now.chroma_px, less_chroma, step_px), exposure_s)
+    return replace(
+        now,
+        luma_px=_stepped(now.luma_px, less_luma, step_px),
+        chroma_px=_stepped(now.chroma_px, less_chroma, step_px),
+        exposure_s=exposure_s,
+    )
 
 
 def _stepped(now_px: float, less: bool, step_px: float) -> float:
     return min(BLUR_MAX_PX, max(0.0, now_px + (-step_px if less else step_px)))
 
 
-def _misfit(patches: Patches, ball: Expected, centre: Array, z: Array, blur_px: float) -> float:
-    """Return the sum of squares that a blur leaves of z (n, 2)."""
-    template = template_for(ball.radius_px, blur_px, ball.shades, patches.half, ball.streak_px)
-    place = (float(centre[0]), float(centre[1]))
-    shapes = sample(template, ball.radius_px, place, patches.half, ball.streak_px)[1][0].reshape(-1, len(patches.x))
-    w = patches.inside[0]
-    model = np.concatenate((shapes, (1.0 - shapes[:1]) * patches.plane)) * w
-    normal = model @ model.T + 1e-9 * np.eye(len(model))
-    rest = z * w[:, None] - model.T @ np.linalg.solve(normal, model @ z)
-    return float((rest * rest).sum())
+@compiled("void(f8[:, ::1], f8[:, ::1], f8[:, ::1])")
+def _without_room(pixels: Array, terms: Array, products: Array) -> None:
+    """Fill in the products of terms and brightness (m, m), m = PLANE + TERMS + 1, with the background taken out.
+
+    terms: (n, TERMS).  Their products stand after the PLANE first rows, the brightness's last, lower triangle.
+    """
+    row = np.empty(len(products))
+    products[:] = 0.0
+    for i in range(len(pixels)):
+        bare = 1.0 - terms[i, 0]
+        row[0], row[1], row[2] = bare, bare * pixels[i, X], bare * pixels[i, Y]
+        row[PLANE:-1] = terms[i]
+        row[-1] = pixels[i, LUMA]
+        for j in range(len(row)):
+            weighted = pixels[i, TRUST] ** 2 * row[j]
+            for k in range(j + 1):
+                products[j, k] += weighted * row[k]
+    eliminate(products, PLANE)
 
 
-def light_on(patches: Patches, ball: Expected, centre: Array, lamp: Vector) -> tuple[Array, Array] | None:
-    """Return the normal equations of the light's terms on the one ball of `patches`, at mean brightness 1.
+def light_on(pixels: Array, ball: Expected, centre: tuple[float, float], lamp: Vector) -> tuple[Array, Array] | None:
+    """Return the normal equations of the light's terms on a ball, at mean brightness 1.
 
     Args:
+        pixels: its patch.
         ball: what is known of it.
-        centre: (2,) fitted centre from the patch's middle pixel [px].
+        centre: as fitted, from the patch's middle pixel [px].
         lamp: the lamp as seen along the ball's ray.
     Returns:
         information (TERMS, TERMS), target (TERMS,) for `Light.learned`; None for a ball without brightness of its own.
     """
-    template = template_for(ball.radius_px, ball.blur.luma_px, every_term(lamp), patches.half, ball.streak_px)
-    place = (float(centre[0]), float(centre[1]))
-    grid, drawn = sample(template, ball.radius_px, place, patches.half, ball.streak_px)
-    value, by_u, by_v = drawn.reshape(3, -1, len(patches.x))
-    terms = value + (centre[0] - grid[0]) * by_u + (centre[1] - grid[1]) * by_v
-    w = patches.inside[0]
-    room = (1.0 - terms[0]) * patches.plane
-    z = patches.z[0, 0, :, 0]
-    # Take the background out of terms and pixels, as the fit does.
-    out = np.linalg.solve(room * w @ room.T + 1e-9 * np.eye(PLANE), room * w)
-    rest, rest_z = terms - (terms @ out.T) @ room, z - (z @ out.T) @ room
-    information, target = rest * w @ rest.T, rest * w @ rest_z
+    template = template_for(ball.radius_px, ball.response.luma_px, every_term(lamp), ball.half, ball.streak_px)
+    n = template.per_px
+    value, by_u, by_v = (np.empty((len(pixels), TERMS)) for _ in range(3))
+    u, v = (round(c * n) for c in centre)
+    places = places_along(ball.streak_px, n)
+    read(template.fine, n, template.reach, template.radius_px, ball.radius_px, u, v, places, pixels, value, by_u, by_v)
+    terms = value + (centre[0] - u / n) * by_u + (centre[1] - v / n) * by_v
+    products = np.empty((PLANE + TERMS + 1, PLANE + TERMS + 1))
+    _without_room(pixels, terms, products)
+    lower = products[PLANE:-1, PLANE:-1]
+    information, target = np.tril(lower) + np.tril(lower, -1).T, products[-1, PLANE:-1]
     even = np.linalg.solve(information[:4, :4] + 1e-9 * np.eye(4), target[:4])
     mean = float(even[0] + 2.0 / 3.0 * even[3])  # z is 2/3 on the mean over a disc
     return (information * mean**2, target * mean) if mean > 0.0 else None

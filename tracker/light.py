@@ -8,7 +8,7 @@ and the shaded limb no longer pulls its centre towards the lamp.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -16,7 +16,8 @@ from tracker.template import TERMS, Shades, Vector
 from tracker.types import Array
 
 FORGETTING = 0.98  # a ball: the light of about the last fifty counts
-ENOUGH = 12  # balls until the light is trusted
+FADED = 0.2  # what is left of what was learned under another gamma
+ENOUGH = 6  # balls until the light is trusted
 RIDGE = np.array([0.0, 0.05, 0.05, 0.05, 0.002, 0.002, 0.002])  # a lamp explains what it can, one-sided light the rest
 LAMP_STEPS = 32  # directions and weights are rounded to 1 / LAMP_STEPS, so that templates can be kept
 _UP = np.array([0.0, 0.0, 1.0])
@@ -59,6 +60,10 @@ class Light:
         length = float(np.linalg.norm(terms[4:7]))
         lamp = np.asarray(terms[4:7] / length) if length > 0.0 and float(pull @ terms[4:7]) > 0.0 else self.lamp
         return Light(lamp, terms, information, target, self.count + 1)
+
+    def faded(self) -> Light:
+        """Return the same light, less sure of it."""
+        return replace(self, information=FADED * self.information, target=FADED * self.target)
 
     def lamp_seen(self, R_RtoW: Array) -> Vector:
         """Return the lamp's direction in a ray's frame, rounded."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from tracker.appearance import Appearance
 from tracker.camera import Camera
-from tracker.centre import Centre, fit_centres
+from tracker.centre import Centre, fit_centre
 from tracker.detect import Blob, find_blobs, region_around
 from tracker.measure import predicted_pixels
 from tracker.patch import Expected
@@ -51,22 +51,20 @@ def look_near(frames: Sequence[Frame], rig: Rig, state: State, appearance: Appea
         appearance: how balls look here.
         floor_px: one sigma of what the fit cannot know, added to its covariance [px].
     """
-    found: list[tuple[Frame, int, Expected]] = []
+    fitted: list[Fitted] = []
     rejections: list[Rejected] = []
     for frame in frames:
         for b, what in _expectations(frame, rig, state, appearance):
             if isinstance(what, Rejected):
                 rejections.append(what)
+                continue
+            centre = fit_centre(frame.image, what)
+            if isinstance(centre, Reason):
+                rejections.append(_rejected(centre, f"{rig.marker.balls[b].name} at {_at(what)}", frame))
             else:
-                found.append((frame, b, what))
-    fitted = []
-    centres = fit_centres([frame.image for frame, _, _ in found], [what for _, _, what in found])
-    for (frame, b, what), centre in zip(found, centres, strict=True):
-        if isinstance(centre, Reason):
-            rejections.append(_rejected(centre, f"{rig.marker.balls[b].name} at {_at(what)}", frame))
-            continue
-        cov_px = frozen_array(centre.cov_px + floor_px**2 * np.eye(2))
-        fitted.append(Fitted(BallSighting(frame.camera, b, frame.t_ns, centre.uv_px, cov_px), frame, what, centre))
+                cov_px = frozen_array(centre.cov_px + floor_px**2 * np.eye(2))
+                sighting = BallSighting(frame.camera, b, frame.t_ns, centre.uv_px, cov_px)
+                fitted.append(Fitted(sighting, frame, what, centre))
     return Look(tuple(fitted), tuple(rejections))
 
 
@@ -91,7 +89,7 @@ def _expectations(
         u, v = blob.uv_px.tolist()
         shades = appearance.shades(camera, camera.bearings(blob.uv_px[None])[0])
         speed_px_s = float(speeds_px_s[b, 0]), float(speeds_px_s[b, 1])
-        yield b, Expected((u, v), radius_px, speed_px_s, shades, appearance.blurs[frame.camera])
+        yield b, Expected((u, v), radius_px, speed_px_s, shades, appearance.responses[frame.camera])
 
 
 def _nearest_blob(frame: Frame, rig: Rig, b: int, uv_px: Array, S: Array, radius_px: float) -> Blob | Rejected:

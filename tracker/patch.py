@@ -2,33 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
+from tracker.compiled import compiled
+from tracker.solve import eliminate
 from tracker.template import MARGIN_PX, STREAK_MAX_PX, Shades, Streak
 from tracker.types import Array, Image
 
 RING_PX = 1.5  # the background's own variation is measured from this far beyond the ball's edge to the patch's corner
 LEAST_NOISE = 1.5  # one sigma of quantisation and compression, grey levels
-PLANE = 3  # terms of the background
-CHANNELS = 3
-# BGR -> luma, blue difference, red difference (ITU-R BT.601)
-_TO_YCC = np.array([[0.114, 0.587, 0.299], [0.5, -0.331264, -0.168736], [-0.081312, -0.418688, 0.5]]).T
+DARKEST = 0.04  # below this share of white a camera's response is straight
+WHITE = 255.0
+X, Y, TRUST, LUMA, CHROMA_B, CHROMA_R = range(6)
+"""Columns of a patch: pixels from its middle, how far the pixel counts, and brightness and colour in units of noise."""
 
 
 @dataclass(frozen=True, slots=True)
-class Blur:
-    """How a camera smears.
+class Response:
+    """How a camera answers to light.
 
-    luma_px, chroma_px: brightness and colour, one sigma of a round kernel, the pixel's box aside [px].
+    luma_px, chroma_px: blur of brightness and colour, one sigma of a round kernel, the pixel's box aside [px].
     exposure_s: how long the shutter stands open [s].
+    gamma: grey levels are light to the power of 1 / gamma.
     """
 
     luma_px: float = 0.4
     chroma_px: float = 0.7
     exposure_s: float = 0.004
+    gamma: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,89 +40,124 @@ class Expected:
     """What is known of a ball before its image is fitted.
 
     uv_px: centre within about a pixel.  radius_px: from its size and distance.
-    speed_px_s: how fast its image moves.  shades: see `template.Shades`.  blur: its camera's.
+    speed_px_s: how fast its image moves.  shades: see `template.Shades`.  response: its camera's.
     """
 
     uv_px: tuple[float, float]
     radius_px: float
     speed_px_s: tuple[float, float]
     shades: Shades
-    blur: Blur
+    response: Response
 
     @property
     def streak_px(self) -> Streak:
         """Return how far its image moves during the exposure [px]."""
-        return self.speed_px_s[0] * self.blur.exposure_s, self.speed_px_s[1] * self.blur.exposure_s
+        return self.speed_px_s[0] * self.response.exposure_s, self.speed_px_s[1] * self.response.exposure_s
+
+    @property
+    def edge_px(self) -> float:
+        """Return how far from its middle its image reaches [px]."""
+        return self.radius_px + min(float(np.hypot(*self.streak_px)), STREAK_MAX_PX) / 2.0
+
+    @property
+    def half(self) -> int:
+        """Return how far its patch must reach from the middle pixel [px]."""
+        return int(np.ceil(self.edge_px + MARGIN_PX))
+
+    @property
+    def middle(self) -> tuple[int, int]:
+        """Return its patch's middle pixel (u, v)."""
+        return round(self.uv_px[0]), round(self.uv_px[1])
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Patches:
-    """Square patches of k balls, n pixels each.
-
-    half: pixels from the middle to the edge.  middle (k, 2): the middle pixels.  x, y (n,): pixels from there.
-    plane (PLANE, n): 1, x, y of the background.  inside (k, n): 1 near the ball, else 0.
-    z (k, 2, n, 2): brightness (its second channel is 0) and colour, whitened by the background's own variation.
-    """
-
-    half: int
-    middle: Array
-    x: Array
-    y: Array
-    plane: Array
-    inside: Array
-    z: Array
-
-
-def patch_half(balls: Sequence[Expected]) -> int:
-    """Return how far patches must reach from their middle pixel [px]."""
-    reach = max(ball.radius_px + min(float(np.hypot(*ball.streak_px)), STREAK_MAX_PX) / 2.0 for ball in balls)
-    return int(np.ceil(reach + MARGIN_PX))
-
-
-def fits_in(image: Image, ball: Expected, half: int) -> bool:
+def fits_in(image: Image, ball: Expected) -> bool:
     """Say whether a ball's patch lies within its image."""
-    u, v = round(ball.uv_px[0]), round(ball.uv_px[1])
+    (u, v), half = ball.middle, ball.half
     height, width = int(image.shape[0]), int(image.shape[1])
     return half <= u < width - half and half <= v < height - half
 
 
-def cut(images: Sequence[Image], balls: Sequence[Expected], half: int) -> Patches:
-    """Cut out and whiten the pixels round balls whose patches lie within their images."""
+@lru_cache(maxsize=16)
+def light_of(gamma: float) -> Array:
+    """Return the light of each grey level (256,), 0..WHITE."""
+    return np.asarray(WHITE * (np.arange(256) / WHITE) ** gamma)
+
+
+@lru_cache(maxsize=16)
+def trust_of(gamma: float) -> Array:
+    """Return the weight of a pixel of each brightness (256,): 1 / the slope of light by grey level."""
+    share = np.maximum(np.arange(256) / WHITE, DARKEST)
+    return np.asarray(1.0 / (gamma * share ** (gamma - 1.0)))
+
+
+@compiled("void(Array(uint8, 3, 'C', True), i8, i8, i8, f8, f8, f8, f8[::1])")
+def _whitening(image: Image, u: int, v: int, half: int, du: float, dv: float, beyond_px: float, scale: Array) -> None:
+    """Find the scales of luma and of the two colour differences by the background's variation about a plane.
+
+    BGR turns into luma, blue and red difference (ITU-R BT.601); colour is made white by Cholesky's factor.
+    """
+    rows = np.zeros((6, 6))  # of 1, x, y, luma, blue, red: their products' sums
+    one = np.empty(6)
+    for y in range(-half, half + 1):
+        for x in range(-half, half + 1):
+            if (x - du) ** 2 + (y - dv) ** 2 <= beyond_px**2:
+                continue
+            b, g, r = image[v + y, u + x, 0], image[v + y, u + x, 1], image[v + y, u + x, 2]
+            one[0], one[1], one[2] = 1.0, x, y
+            one[3] = 0.114 * b + 0.587 * g + 0.299 * r
+            one[4] = 0.5 * b - 0.331264 * g - 0.168736 * r
+            one[5] = -0.081312 * b - 0.418688 * g + 0.5 * r
+            for i in range(6):
+                for j in range(i + 1):
+                    rows[i, j] += one[i] * one[j]
+    freedom = max(rows[0, 0] - 3.0, 1.0)
+    eliminate(rows, 3)
+    least = LEAST_NOISE**2
+    a = np.sqrt(max(rows[4, 4], 0.0) / freedom + least)
+    b_over_a = rows[5, 4] / freedom / a
+    c = np.sqrt(max(rows[5, 5] / freedom + least - b_over_a * b_over_a, least))
+    scale[0] = 1.0 / np.sqrt(max(rows[3, 3], 0.0) / freedom + least)
+    scale[1] = 1.0 / a
+    scale[2] = 1.0 / c
+    scale[3] = b_over_a / (a * c)
+
+
+@compiled("f8[:, ::1](Array(uint8, 3, 'C', True), i8, i8, i8, f8, f8, f8, f8[::1], f8[::1])")
+def cut_pixels(
+    image: Image, u: int, v: int, half: int, du: float, dv: float, edge_px: float, light: Array, trust: Array
+) -> Array:
+    """Cut out and whiten; (u, v) is the middle pixel, (du, dv) the ball's place from there."""
     side = 2 * half + 1
-    span = np.arange(-half, half + 1, dtype=np.float64)
-    middles = [(round(ball.uv_px[0]), round(ball.uv_px[1])) for ball in balls]
-    pixels = np.stack(
-        [image[v - half : v + half + 1, u - half : u + half + 1] for image, (u, v) in zip(images, middles, strict=True)]
-    )
-    ycc = pixels.reshape(len(balls), side * side, 3) @ _TO_YCC
-    x, y = np.tile(span, side), np.repeat(span, side)
-    middle = np.array(middles, dtype=np.float64)
-    offset = np.array([ball.uv_px for ball in balls]) - middle
-    distance = np.sqrt((x - offset[:, :1]) ** 2 + (y - offset[:, 1:]) ** 2)
-    edge = np.array([[ball.radius_px + float(np.hypot(*ball.streak_px)) / 2.0] for ball in balls])
-    plane = np.stack((np.ones_like(x), x / half, y / half))
-    variance = _variation(ycc, plane, (distance > edge + RING_PX).astype(np.float64))
-    inside = (distance < edge + MARGIN_PX).astype(np.float64)
-    return Patches(half, middle, x, y, plane, inside, _whitened(ycc, variance))
+    scale = np.zeros(6)
+    _whitening(image, u, v, half, du, dv, edge_px + RING_PX, scale)
+    pixels = np.empty((side * side, 6))
+    count = 0
+    for y in range(-half, half + 1):
+        for x in range(-half, half + 1):
+            if (x - du) ** 2 + (y - dv) ** 2 >= (edge_px + MARGIN_PX) ** 2:
+                continue
+            b, g, r = image[v + y, u + x, 0], image[v + y, u + x, 1], image[v + y, u + x, 2]
+            brightness = 0.114 * b + 0.587 * g + 0.299 * r
+            lb, lg, lr = light[b], light[g], light[r]
+            luma = 0.114 * lb + 0.587 * lg + 0.299 * lr
+            blue = 0.5 * lb - 0.331264 * lg - 0.168736 * lr
+            red = -0.081312 * lb - 0.418688 * lg + 0.5 * lr
+            pixels[count, X] = x
+            pixels[count, Y] = y
+            pixels[count, TRUST] = trust[int(brightness + 0.5)]
+            pixels[count, LUMA] = luma * scale[0]
+            pixels[count, CHROMA_B] = blue * scale[1]
+            pixels[count, CHROMA_R] = red * scale[2] - blue * scale[3]
+            count += 1
+    return pixels[:count].copy()
 
 
-def _variation(ycc: Array, plane: Array, ring: Array) -> Array:
-    """Return the covariance (k, 3, 3) of the background pixels, 1 in `ring` (k, n), about their own plane."""
-    on = ring[:, None, :] * plane
-    normal = on @ plane.T + 1e-9 * np.eye(PLANE)
-    rest = (ycc - plane.T @ np.linalg.solve(normal, on @ ycc)) * ring[:, :, None]
-    freedom = np.maximum(ring.sum(axis=1) - PLANE, 1.0)
-    covariance = rest.transpose(0, 2, 1) @ rest / freedom[:, None, None]
-    return np.asarray(covariance + LEAST_NOISE**2 * np.eye(CHANNELS))
+def cut(image: Image, ball: Expected) -> Array:
+    """Cut out the pixels of a ball whose patch lies within its image (n, 6): see the columns' names.
 
-
-def _whitened(ycc: Array, variance: Array) -> Array:
-    """Return brightness and colour (k, 2, n, 2) in units of their noise; colour by Cholesky's factor, by hand."""
-    a = np.sqrt(variance[:, 1, 1])
-    b = variance[:, 1, 2] / a
-    c = np.sqrt(variance[:, 2, 2] - b * b)
-    z = np.zeros((*ycc.shape[:1], 2, ycc.shape[1], 2))
-    z[:, 0, :, 0] = ycc[:, :, 0] / np.sqrt(variance[:, 0, 0])[:, None]
-    z[:, 1, :, 0] = ycc[:, :, 1] / a[:, None]
-    z[:, 1, :, 1] = (ycc[:, :, 2] - b[:, None] * z[:, 1, :, 0]) / c[:, None]
-    return z
+    Light is undone of the camera's gamma, since ball and background mix as light; a pixel's trust falls as gamma
+    spreads its noise. Brightness and colour are scaled by what the ring round the ball varies, in grey levels.
+    """
+    (u, v), gamma = ball.middle, ball.response.gamma
+    offset = ball.uv_px[0] - u, ball.uv_px[1] - v
+    return cut_pixels(image, u, v, ball.half, *offset, ball.edge_px, light_of(gamma), trust_of(gamma))

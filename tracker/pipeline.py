@@ -17,15 +17,14 @@ import numpy as np
 
 from tracker import so3
 from tracker.acquire import first_state
-from tracker.appearance import Appearance
 from tracker.detect import Blob
 from tracker.ekf import Update, predict, update
 from tracker.gate import chi2_limit
 from tracker.history import History
 from tracker.intake import Intake
 from tracker.look import Fitted, look_everywhere, look_near
-from tracker.patch import Blur
 from tracker.rig import Rig
+from tracker.rivals import first_rivals
 from tracker.rounds import Rounds
 from tracker.state import State
 from tracker.tuning import Tuning
@@ -69,7 +68,7 @@ class Tracker:
         self._stopwatch = stopwatch
         self._intake = Intake(rig)
         self._rounds = Rounds(len(rig.cameras), tuning.sync_window_ns)
-        self._appearance = Appearance(tuple(Blur() for _ in rig.cameras))
+        self._rivals = first_rivals(len(rig.cameras))
         self._turn = 0
         self._history = History()
         self._whole: dict[int, tuple[Frame, list[list[Blob]]]] = {}
@@ -147,7 +146,7 @@ class Tracker:
 
         start: the state is a first guess, which every ball must bear out.
         """
-        look = look_near(frames, self._rig, ahead, self._appearance, self._tuning.pixel_noise_floor_px)
+        look = look_near(frames, self._rig, ahead, self._rivals.best, self._tuning.pixel_noise_floor_px)
         harvest.rejections += look.rejections
         result = self._update(ahead, tuple(one.sighting for one in look.fitted))
         if isinstance(result, Update) and start and not self._all_seen_twice(result):
@@ -163,12 +162,12 @@ class Tracker:
     def _learn(self, fitted: list[Fitted]) -> None:
         """Learn how balls look: from every one at first, then from one in turn every few rounds."""
         self._turn += 1
-        if self._appearance.light.count >= LEARN_ALL:
+        if self._rivals.settled and self._rivals.best.light.count >= LEARN_ALL:
             fitted = [fitted[self._turn // LEARN_EVERY % len(fitted)]] if self._turn % LEARN_EVERY == 0 else []
         for one in fitted:
             index = one.frame.camera
             camera, image = self._rig.cameras[index], one.frame.image
-            self._appearance = self._appearance.learned(image, camera, index, one.expected, one.centre)
+            self._rivals = self._rivals.learned(image, camera, index, one.expected, one.centre)
 
     def _update(self, ahead: State, sightings: tuple[BallSighting, ...]) -> Update | Rejected:
         """Update a predicted state, unless it comes to lean as no vehicle does."""
@@ -192,6 +191,8 @@ class Tracker:
         found = self._see(tuple(frame for frame, _ in fresh.values()), start, harvest, start=True)
         if found is None:
             return None
+        for _ in range(self._rivals.lessons_due):
+            found = self._see(tuple(frame for frame, _ in fresh.values()), start, _Harvest(), start=True) or found
         before = self._history.newest
         if before is not None and self._jumped(before, found.state):
             self._resets = (self._resets + 1) % RESETS

@@ -16,6 +16,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.compiled import compiled
+from tracker.types import Array
+
 TERMS = 7
 """1, x, y, z, and x, y, z again where the lamp shines."""
 MARGIN_PX = 3.5  # patch beyond the ball's edge
@@ -51,7 +54,7 @@ def every_term(lamp: Vector) -> Shades:
 class Template:
     """Shapes on a grid of 1 / per_px pixel.
 
-    fine: (p, size, size), rows are v.  reach: the grid runs from -reach to reach pixels round the centre.
+    fine: (size, size, p), rows are v.  reach: the grid runs from -reach to reach pixels round the centre.
     radius_px: of the ball drawn.
     """
 
@@ -60,69 +63,55 @@ class Template:
     reach: int
     radius_px: float
 
-    def at(self, u_steps: int, v_steps: int, half: int) -> NDArray[np.float32]:
-        """Return (p, m, m), m = 2 half + 1: the shapes at the pixels round a centre at (u, v) / per_px."""
-        n = self.per_px
-        left, top = (self.reach - half) * n - u_steps, (self.reach - half) * n - v_steps
-        span = 2 * half * n + 1
-        return self.fine[:, top : top + span : n, left : left + span : n]
-
-    def with_slopes(self, u_steps: int, v_steps: int, half: int) -> NDArray[np.float32]:
-        """Return (3, p, m, m): the shapes and their slopes by the centre's u and v [1/px]."""
-        drawn = np.empty((3, len(self.fine), 2 * half + 1, 2 * half + 1), dtype=np.float32)
-        drawn[0] = self.at(u_steps, v_steps, half)
-        np.subtract(self.at(u_steps + 1, v_steps, half), self.at(u_steps - 1, v_steps, half), out=drawn[1])
-        np.subtract(self.at(u_steps, v_steps + 1, half), self.at(u_steps, v_steps - 1, half), out=drawn[2])
-        drawn[1:] *= np.float32(self.per_px / 2.0)
-        return drawn
-
 
 def template_for(radius_px: float, blur_px: float, shades: Shades, half: int, streak_px: Streak) -> Template:
     """Return the template of a ball, large enough for patches of 2 half + 1 pixels and the ball's streak.
 
     blur_px: one sigma of the lens's round kernel; the pixel's box comes on top.
     """
-    reach = half + 2 + (0 if _smears(streak_px)[0] == 1 else round(STREAK_MAX_PX / 2.0))
+    reach = half + 2 + (0 if math.hypot(*streak_px) == 0.0 else round(STREAK_MAX_PX / 2.0))
     return _draw(round(radius_px / RADIUS_STEP_PX), round(blur_px / BLUR_STEP_PX), shades, reach)
 
 
-def _smears(streak_px: Streak) -> tuple[int, float]:
-    """Return in how many places along a streak the ball is drawn, and by what factor the streak is shortened."""
+def places_along(streak_px: Streak, per_px: int) -> NDArray[np.int64]:
+    """Return where along a streak the ball is drawn (k, 2): steps in u and v from its middle [1/per_px px]."""
     length = math.hypot(*streak_px)
     shrink = min(1.0, STREAK_MAX_PX / length) if length > 0.0 else 0.0
-    return math.ceil(2.0 * length * shrink) | 1, shrink
+    count = math.ceil(2.0 * length * shrink) | 1
+    along = ((np.arange(count) + 0.5) / count - 0.5) * (shrink * per_px)
+    places: NDArray[np.int64] = np.rint(along[:, None] * np.array(streak_px)).astype(np.int64)
+    return places
 
 
-@lru_cache(maxsize=256)
-def _draw(radius_steps: int, blur_steps: int, shades: Shades, reach: int) -> Template:
-    """Draw the shapes of a ball of a rounded radius and blur."""
-    radius_px, blur_px = radius_steps * RADIUS_STEP_PX, blur_steps * BLUR_STEP_PX
-    per_px = 8 if radius_px < 6.0 else 4
-    size = 2 * reach * per_px + 1
-    kernel = _kernel(per_px, blur_px)
-    fine = np.empty((len(shades.weights), size, size), dtype=np.float32)
-    for k, sharp in enumerate(_sharp(per_px, radius_px, shades)):
-        border = (size - len(sharp)) // 2
-        padded = cv2.copyMakeBorder(sharp, border, border, border, border, cv2.BORDER_CONSTANT, value=(0.0,))
-        fine[k] = cv2.sepFilter2D(padded, -1, kernel, kernel, borderType=cv2.BORDER_CONSTANT)
-    fine.flags.writeable = False
-    return Template(fine, per_px, reach, radius_px)
-
-
-def _sharp(per_px: int, radius_px: float, shades: Shades) -> NDArray[np.float32]:
-    """Return the shapes (p, size, size) before lens and pixel, just round the disc, sharp but for the grid's step."""
-    count = int(np.ceil(radius_px * per_px)) + 1
-    axis = np.arange(-count, count + 1) / (per_px * radius_px)
-    x, y = (a.ravel() for a in np.broadcast_arrays(axis[None, :], axis[:, None]))
-    distance = np.hypot(x, y)
-    step = float(axis[1] - axis[0])
-    disc = np.clip((1.0 - distance) / step + 0.5, 0.0, 1.0)
-    shrink = 1.0 / np.maximum(1.0, distance)
-    normal = np.stack((x * shrink, y * shrink, np.sqrt(np.maximum(0.0, 1.0 - distance * distance))))
-    lit = np.clip(np.asarray(shades.lamp) @ normal / step + 0.5, 0.0, 1.0)
-    terms = np.concatenate((np.ones((1, x.size)), normal, normal * lit)) * disc
-    shapes = np.asarray(shades.weights, dtype=np.float64) @ terms
-    return np.asarray(shapes.reshape(-1, len(axis), len(axis)), dtype=np.float32)
+@compiled("f4[:, :, ::1](i8, f8, i8, f8[::1], f8[:, ::1])")
+def _sharp(per_px: int, radius_px: float, border: int, lamp: Array, weights: Array) -> NDArray[np.float32]:
+    """Return the shapes (size, size, p) before lens and pixel, sharp but for the grid's step, with an empty border."""
+    count = int(np.ceil(radius_px * per_px)) + 1 + border
+    size = 2 * count + 1
+    shapes = np.zeros((size, size, len(weights)), dtype=np.float32)
+    step = 1.0 / (per_px * radius_px)
+    terms = np.empty(TERMS)
+    for row in range(size):
+        y = (row - count) * step
+        for column in range(size):
+            x = (column - count) * step
+            distance = np.sqrt(x * x + y * y)
+            disc = min((1.0 - distance) / step + 0.5, 1.0)
+            if disc <= 0.0:
+                continue
+            shrink = 1.0 / max(1.0, distance)
+            terms[0], terms[1], terms[2] = 1.0, x * shrink, y * shrink
+            terms[3] = np.sqrt(max(0.0, 1.0 - distance * distance))
+            cosine = lamp[0] * terms[1] + lamp[1] * terms[2] + lamp[2] * terms[3]
+            lit = min(1.0, max(0.0, cosine / step + 0.5))
+            for i in range(3):
+                terms[4 + i] = terms[1 + i] * lit
+            for k in range(len(weights)):
+                total = 0.0
+                for i in range(TERMS):
+                    total += weights[k, i] * terms[i]
+                shapes[row, column, k] = total * disc
+    return shapes
 
 
 def _kernel(per_px: int, blur_px: float) -> NDArray[np.float32]:
@@ -138,36 +127,73 @@ def _kernel(per_px: int, blur_px: float) -> NDArray[np.float32]:
     return np.convolve(box, lens / lens.sum()).astype(np.float32)
 
 
-def sample(
-    template: Template, radius_px: float, centre: tuple[float, float], half: int, streak_px: Streak
-) -> tuple[tuple[float, float], NDArray[np.float32]]:
-    """Read a template off at the grid point nearest a centre, smeared along a streak.
+@lru_cache(maxsize=256)
+def _draw(radius_steps: int, blur_steps: int, shades: Shades, reach: int) -> Template:
+    """Draw the shapes of a ball of a rounded radius and blur."""
+    radius_px, blur_px = radius_steps * RADIUS_STEP_PX, blur_steps * BLUR_STEP_PX
+    per_px = 8 if radius_px < 6.0 else 4
+    kernel = _kernel(per_px, blur_px)
+    weights = np.array(shades.weights)
+    border = len(kernel) // 2 + 1
+    drawn = _sharp(per_px, radius_px, border, np.array(shades.lamp), weights)
+    blurred = cv2.sepFilter2D(drawn, -1, kernel, kernel, borderType=cv2.BORDER_CONSTANT)
+    blurred = blurred.reshape(*drawn.shape)  # OpenCV drops a single channel's axis
+    fine = np.zeros((2 * reach * per_px + 1, 2 * reach * per_px + 1, len(weights)), dtype=np.float32)
+    off = (len(fine) - len(blurred)) // 2
+    if off >= 0:
+        fine[off : off + len(blurred), off : off + len(blurred)] = blurred
+    else:
+        fine[:] = blurred[-off : -off + len(fine), -off : -off + len(fine)]
+    fine.flags.writeable = False
+    return Template(fine, per_px, reach, radius_px)
+
+
+@compiled(
+    "void(Array(float32, 3, 'C', True), i8, i8, f8, f8, i8, i8, i8[:, ::1], f8[:, ::1],"
+    "f8[:, ::1], f8[:, ::1], f8[:, ::1])"
+)
+def read(
+    fine: NDArray[np.float32],
+    per_px: int,
+    reach: int,
+    drawn_px: float,
+    radius_px: float,
+    u_steps: int,
+    v_steps: int,
+    places: NDArray[np.int64],
+    pixels: Array,
+    value: Array,
+    by_u: Array,
+    by_v: Array,
+) -> None:
+    """Read a template off for a centre at (u_steps, v_steps) / per_px from a patch's middle, smeared along a streak.
 
     Args:
-        radius_px: the ball's, which the template's is rounded from; the rest is put right by the slope of a picture
-            blown up about its centre, d/dr = (x d/du + y d/dv) / r, since d/du = -d/dx; the blur grows with it, by a
+        fine, per_px, reach, drawn_px: of the template.
+        radius_px: the ball's, which drawn_px is rounded from; the rest is put right by the slope of a picture blown
+            up about its centre, d/dr = (x d/du + y d/dv) / r, since d/du = -d/dx; the blur grows with it, by a
             percent.
-        centre: (u, v) from the patch's middle pixel [px].
-        half: the patch is (2 half + 1) pixels square.
-        streak_px: how far the ball moves during the exposure [px].
-    Returns:
-        centre: the grid point, at most half a step off [px].
-        shapes (3, p, m, m): value, slope by u, slope by v.
+        places (k, 2): of the ball along its streak, see `places_along`.
+        pixels (n, ...): the patch, x and y in its first columns.
+        value, by_u, by_v (n, p): the shapes, and their slopes by the centre's u and v [1/px], to be filled in.
     """
-    n = template.per_px
-    limit = 3 * n // 2  # a centre further from the middle pixel has run away
-    ku, kv = (max(-limit, min(limit, round(c * n))) for c in centre)
-    count, shrink = _smears(streak_px)
-    if count == 1:
-        drawn = template.with_slopes(ku, kv, half)
-    else:
-        places = [((k + 0.5) / count - 0.5) * shrink * n for k in range(count)]
-        smears = [
-            template.with_slopes(ku + round(t * streak_px[0]), kv + round(t * streak_px[1]), half) for t in places
-        ]
-        drawn = np.sum(smears, axis=0) / np.float32(count)
-    share = np.float32((radius_px - template.radius_px) / template.radius_px)
-    axis = np.arange(-half, half + 1, dtype=np.float32) * share
-    u0, v0 = np.float32(ku / n) * share, np.float32(kv / n) * share
-    drawn[0] += (axis - u0) * drawn[1] + (axis - v0)[:, None] * drawn[2]
-    return (ku / n, kv / n), drawn
+    shapes = value.shape[1]
+    mean = 1.0 / len(places)
+    slope = mean * per_px / 2.0
+    share = (radius_px - drawn_px) / drawn_px
+    for i in range(len(pixels)):
+        x, y = pixels[i, 0], pixels[i, 1]
+        row, column = int((reach + y) * per_px) - v_steps, int((reach + x) * per_px) - u_steps
+        for p in range(shapes):
+            value[i, p] = by_u[i, p] = by_v[i, p] = 0.0
+        for k in range(len(places)):
+            r, c = row - places[k, 1], column - places[k, 0]
+            for p in range(shapes):
+                value[i, p] += fine[r, c, p]
+                by_u[i, p] += fine[r, c - 1, p] - fine[r, c + 1, p]
+                by_v[i, p] += fine[r - 1, c, p] - fine[r + 1, c, p]
+        along_u, along_v = (x - u_steps / per_px) * share, (y - v_steps / per_px) * share
+        for p in range(shapes):
+            by_u[i, p] *= slope
+            by_v[i, p] *= slope
+            value[i, p] = value[i, p] * mean + along_u * by_u[i, p] + along_v * by_v[i, p]

@@ -129,7 +129,7 @@ class TrackerSettings(Section):
     tilt_limit_deg: Annotated[float, Strict(), Field(gt=0, le=180)] = 60.0
     sync_window_ms: NotNegative = 4.0
     gate_probability: Annotated[float, Strict(), Field(gt=0, lt=1)] = 0.999
-    pixel_noise_floor_px: Positive = 0.1
+    pixel_noise_floor_px: Positive = 0.05
     process: ProcessSettings = ProcessSettings()
 
 

@@ -7,15 +7,15 @@ import pytest
 
 from tests.tracker.drawing import developed, draw_ball, empty_canvas
 from tests.tracker.paper_rig import paper_rig
-from tracker.centre import Centre, fit_centres
-from tracker.patch import Blur, Expected
+from tracker.centre import Centre, fit_centre
+from tracker.patch import Expected, Response
 from tracker.template import FLAT
 from tracker.types import Array, Image, Reason
 
 RIG = paper_rig()
 BALL = RIG.marker.balls[1]
 RADIUS_PX = 2.8  # the paper's ball in the middle of the room
-SHARP = Blur(0.2, 0.2)
+SHARP = Response(0.2, 0.2)
 
 
 def expected(uv_px: Array, radius_px: float = RADIUS_PX) -> Expected:
@@ -31,7 +31,7 @@ def picture(
 
 
 def fitted(image: Image, guess_px: Array, radius_px: float = RADIUS_PX) -> Centre:
-    (found,) = fit_centres([image], [expected(guess_px, radius_px)])
+    found = fit_centre(image, expected(guess_px, radius_px))
     assert isinstance(found, Centre), found
     return found
 
@@ -84,20 +84,7 @@ def test_errors_are_of_the_size_that_the_covariance_says() -> None:
 
 @pytest.mark.parametrize("uv_px", [(1.0, 200.0), (200.0, 2.0), (638.5, 200.0), (200.0, 478.0), (-5.0, -5.0)])
 def test_a_ball_cut_by_the_border_is_rejected(uv_px: tuple[float, float]) -> None:
-    assert fit_centres([picture(np.array(uv_px))], [expected(np.array(uv_px))]) == [Reason.AT_BORDER]
-
-
-def test_balls_of_one_image_are_fitted_as_each_alone_and_one_at_the_border_spoils_no_other() -> None:
-    canvas = empty_canvas(RIG.cameras[0])
-    places = [np.array(uv) for uv in ((100.3, 200.7), (2.0, 100.0), (300.0, 50.5))]
-    for uv_px in places:
-        draw_ball(canvas, uv_px, RADIUS_PX, BALL)
-    image = developed(canvas)
-    together = fit_centres([image] * 3, [expected(uv_px) for uv_px in places])
-    assert together[1] is Reason.AT_BORDER
-    for found, uv_px in ((together[0], places[0]), (together[2], places[2])):
-        assert isinstance(found, Centre)
-        assert np.allclose(found.uv_px, fitted(image, uv_px).uv_px, atol=0.02)
+    assert fit_centre(picture(np.array(uv_px)), expected(np.array(uv_px))) is Reason.AT_BORDER
 
 
 def test_an_image_that_nobody_may_write_to_can_be_fitted() -> None:

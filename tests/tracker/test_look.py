@@ -12,14 +12,14 @@ from tests.tracker.paper_rig import paper_rig
 from tests.tracker.rigs import covariance, perturbed, seen_px, state
 from tracker.appearance import Appearance
 from tracker.look import look_everywhere, look_near
-from tracker.patch import Blur
+from tracker.patch import Response
 from tracker.state import State
 from tracker.types import BallSighting, Frame, Reason, Rejected
 
 RIG = paper_rig()
 FLYING = state(0, (0.2, -0.1, 0.1), (12.0, -8.0, 130.0), (0.5, 0.5, 0.2), (0.3, 0.2, 1.0))
 FLOOR_PX = 0.05
-SHARP = Appearance((Blur(0.25, 0.25), Blur(0.25, 0.25)))
+SHARP = Appearance((Response(0.25, 0.25), Response(0.25, 0.25)))
 
 
 def look(image: Frame, expected: State) -> tuple[list[BallSighting], list[Rejected]]:
