@@ -11,7 +11,7 @@ from tracker.camera import Camera
 from tracker.centre import Centre
 from tracker.lesson import light_on, sharper
 from tracker.light import Light, ray_frame
-from tracker.patch import Expected, Response, cut
+from tracker.patch import Expected, Response, cut, extent_of
 from tracker.template import FLAT, Shades
 from tracker.types import Array, Image
 
@@ -78,8 +78,9 @@ class Appearance:
         """
         if found.misfit > MISFIT_MAX:
             return self
-        pixels = cut(image, ball)
-        centre = float(found.uv_px[0]) - ball.middle[0], float(found.uv_px[1]) - ball.middle[1]
+        extent = extent_of(ball)
+        pixels = cut(image, extent, ball.response.gamma)
+        centre = float(found.uv_px[0]) - extent.u, float(found.uv_px[1]) - extent.v
         response = sharper(pixels, ball, centre, max(BLUR_STEP_PX, FIRST_STEP_PX / (1.0 + self.light.count / 6.0)))
         R_RtoW = ray_frame(camera.bearings(found.uv_px[None])[0], camera.R_CtoW)
         equations = light_on(pixels, ball, centre, self.light.lamp_seen(R_RtoW))

@@ -9,14 +9,15 @@ lose their weight (Tukey's biweight).
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tracker.compiled import compiled
-from tracker.patch import LUMA, TRUST, Expected, X, Y, cut, fits_in
-from tracker.solve import cholesky, lower, solve
+from tracker.patch import LUMA, TRUST, Expected, X, Y, cut, extent_of, fits_in
+from tracker.solve import cholesky, dot, lower, solve
 from tracker.template import places_along, read, template_for
 from tracker.types import Array, Image, Reason, frozen_array
 
@@ -43,47 +44,66 @@ class Centre:
 
 
 @compiled("void(f8[:, ::1], f8[:, ::1], f8[:, ::1])")
-def _fill(pixels: Array, value: Array, columns: Array) -> None:
-    """Fill in the model's columns (n, p + 3): the shapes (n, p), and the background's plane where the ball is not."""
-    p = value.shape[1]
-    for i in range(len(pixels)):
-        for j in range(p):
-            columns[i, j] = value[i, j]
-        columns[i, p] = 1.0 - value[i, 0]
-        columns[i, p + 1] = columns[i, p] * pixels[i, X]
-        columns[i, p + 2] = columns[i, p] * pixels[i, Y]
+def _fill(pixels: Array, value: Array, model: Array) -> None:
+    """Fill in the model's rows (p + 3, n): the shapes (p, n), and the background's plane where the ball is not."""
+    p = len(value)
+    model[:p] = value
+    for i in range(pixels.shape[1]):
+        bare = 1.0 - value[0, i]
+        model[p, i] = bare
+        model[p + 1, i] = bare * pixels[X, i]
+        model[p + 2, i] = bare * pixels[Y, i]
 
 
 @compiled("void(f8[:, ::1], f8[:, ::1], f8[::1], i8, i8, f8[:, ::1], f8[:, ::1])")
 def _fit_linear(
-    pixels: Array, columns: Array, weight: Array, first: int, last: int, factor: Array, coefficients: Array
+    pixels: Array, model: Array, weight: Array, first: int, last: int, factor: Array, coefficients: Array
 ) -> None:
     """Solve for the linear coefficients of channels first to last - 1 (3, m), which are blurred alike.
 
     Args:
-        columns (n, m): the model's.  weight (n,): of each pixel.  factor (m, m): Cholesky's, filled in.
+        model (m, n).  weight (n,): of each pixel.  factor (m, m): Cholesky's, filled in.
     """
-    m = columns.shape[1]
-    factor[:] = 0.0
-    coefficients[first:last] = 0.0
-    for i in range(len(pixels)):
-        for j in range(m):
-            weighted = weight[i] * columns[i, j]
-            for k in range(j + 1):
-                factor[j, k] += weighted * columns[i, k]
-            for channel in range(first, last):
-                coefficients[channel, j] += weighted * pixels[i, LUMA + channel]
-    for j in range(m):
+    weighted = np.empty(len(weight))
+    for j in range(len(model)):
+        for i in range(len(weight)):
+            weighted[i] = weight[i] * model[j, i]
+        for k in range(j + 1):
+            factor[j, k] = dot(weighted, model[k])
         factor[j, j] *= RIDGE
+        for channel in range(first, last):
+            coefficients[channel, j] = dot(weighted, pixels[LUMA + channel])
     cholesky(factor)
     for channel in range(first, last):
         solve(factor, coefficients[channel])
 
 
+@compiled("void(f8[:, ::1], f8[::1], f8[::1])")
+def _residual(model: Array, c: Array, rest: Array) -> None:
+    """Take the model with coefficients c (m,) off what rest (n,) holds."""
+    for j in range(len(model)):
+        for i in range(len(rest)):
+            rest[i] -= c[j] * model[j, i]
+
+
+@compiled("void(f8[:, ::1], f8[:, ::1], f8[::1], f8[::1])")
+def _slope(pixels: Array, by: Array, c: Array, slope: Array) -> None:
+    """Fill in the slope (n,) of the model with coefficients c (m,), from the shapes' slopes (p, n).
+
+    The background's rows are (1 - coverage) (1, x, y); their slopes are minus the coverage's times (1, x, y).
+    """
+    p = len(by)
+    for i in range(len(slope)):
+        slope[i] = (c[0] - c[p] - c[p + 1] * pixels[X, i] - c[p + 2] * pixels[Y, i]) * by[0, i]
+    for j in range(1, p):
+        for i in range(len(slope)):
+            slope[i] += c[j] * by[j, i]
+
+
 @compiled("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], i8, f8[:, ::1], f8[::1], f8[::1], f8[::1])")
 def _add_channel(
     pixels: Array,
-    columns: Array,
+    model: Array,
     by_u: Array,
     by_v: Array,
     weight: Array,
@@ -96,40 +116,32 @@ def _add_channel(
     """Add what one channel says of the centre.
 
     Args:
-        by_u, by_v (n, p): slopes of the shapes.  factor, c (m,): from `_fit_linear`.
+        by_u, by_v (p, n): slopes of the shapes.  factor, c (m,): from `_fit_linear`.
         squares (n,): misfit of each pixel, added to.
         normal (5,): information uu, uv, vv and gradient u, v of the centre, added to.
     """
-    m, p = columns.shape[1], by_u.shape[1]
-    T_u, T_v = np.zeros(m), np.zeros(m)
-    for i in range(len(pixels)):
-        fitted = 0.0
-        for j in range(m):
-            fitted += columns[i, j] * c[j]
-        rest = pixels[i, LUMA + channel] - fitted
-        squares[i] += pixels[i, TRUST] ** 2 * rest * rest / CHANNELS
-        # The plane's columns are (1 - coverage) (1, x, y); their slopes are minus the coverage's.
-        uncovered = c[p] + pixels[i, X] * c[p + 1] + pixels[i, Y] * c[p + 2]
-        slope_u, slope_v = -by_u[i, 0] * uncovered, -by_v[i, 0] * uncovered
-        for j in range(p):
-            slope_u += by_u[i, j] * c[j]
-            slope_v += by_v[i, j] * c[j]
-        weighted_u, weighted_v = weight[i] * slope_u, weight[i] * slope_v
-        normal[0] += weighted_u * slope_u
-        normal[1] += weighted_u * slope_v
-        normal[2] += weighted_v * slope_v
-        normal[3] += weighted_u * rest
-        normal[4] += weighted_v * rest
-        for j in range(m):
-            T_u[j] += weighted_u * columns[i, j]
-            T_v[j] += weighted_v * columns[i, j]
+    m, n = model.shape
+    rest, slope_u, slope_v = pixels[LUMA + channel].copy(), np.empty(n), np.empty(n)
+    _residual(model, c, rest)
+    _slope(pixels, by_u, c, slope_u)
+    _slope(pixels, by_v, c, slope_v)
+    weighted_u, weighted_v = weight * slope_u, weight * slope_v
+    for i in range(n):
+        squares[i] += (pixels[TRUST, i] * rest[i]) ** 2 / CHANNELS
+    normal[0] += dot(weighted_u, slope_u)
+    normal[1] += dot(weighted_u, slope_v)
+    normal[2] += dot(weighted_v, slope_v)
+    normal[3] += dot(weighted_u, rest)
+    normal[4] += dot(weighted_v, rest)
     # What the linear coefficients can follow says nothing of the centre.
+    T_u, T_v = np.empty(m), np.empty(m)
+    for j in range(m):
+        T_u[j], T_v[j] = dot(weighted_u, model[j]), dot(weighted_v, model[j])
     lower(factor, T_u)
     lower(factor, T_v)
-    for j in range(m):
-        normal[0] -= T_u[j] * T_u[j]
-        normal[1] -= T_u[j] * T_v[j]
-        normal[2] -= T_v[j] * T_v[j]
+    normal[0] -= dot(T_u, T_u)
+    normal[1] -= dot(T_u, T_v)
+    normal[2] -= dot(T_v, T_v)
 
 
 @compiled(
@@ -152,20 +164,20 @@ def _linearise(
     normal: Array,
 ) -> None:
     """Linearise about a centre at (u_steps, v_steps) / per_px; fill in squares and normal as `_add_channel` does."""
-    count, p = len(pixels), luma.shape[2]
-    weight = (tukey * pixels[:, TRUST]) ** 2
-    columns = np.empty((count, p + PLANE))
-    value, by_u, by_v = np.empty((count, p)), np.empty((count, p)), np.empty((count, p))
+    count, p = pixels.shape[1], luma.shape[2]
+    weight = (tukey * pixels[TRUST]) ** 2
+    model = np.empty((p + PLANE, count))
+    value, by_u, by_v = np.empty((p, count)), np.empty((p, count)), np.empty((p, count))
     factor, coefficients = np.empty((p + PLANE, p + PLANE)), np.empty((CHANNELS, p + PLANE))
     squares[:] = 0.0
     normal[:] = 0.0
     for first, last, fine in ((0, 1, luma), (1, CHANNELS, chroma)):
         read(fine, per_px, reach, drawn_px, radius_px, u_steps, v_steps, places, pixels, value, by_u, by_v)
-        _fill(pixels, value, columns)
-        _fit_linear(pixels, columns, weight, first, last, factor, coefficients)
+        _fill(pixels, value, model)
+        _fit_linear(pixels, model, weight, first, last, factor, coefficients)
         for channel in range(first, last):
             c = coefficients[channel]
-            _add_channel(pixels, columns, by_u, by_v, weight, channel, factor, c, squares, normal)
+            _add_channel(pixels, model, by_u, by_v, weight, channel, factor, c, squares, normal)
 
 
 @compiled("f8(f8[:, ::1], Array(float32, 3, 'C', True), i8, i8, f8, f8, i8[:, ::1], i8, i8, i8)")
@@ -182,21 +194,19 @@ def _misfit(
     group: int,
 ) -> float:
     """Return the sum of squares left in brightness (group 0) or colour (1) at a centre on the grid."""
-    count, p = len(pixels), fine.shape[2]
+    count, p = pixels.shape[1], fine.shape[2]
     first, last = (0, 1) if group == 0 else (1, CHANNELS)
-    value, by_u, by_v = np.empty((count, p)), np.empty((count, p)), np.empty((count, p))
-    columns, weight = np.empty((count, p + PLANE)), pixels[:, TRUST] ** 2
+    value, by_u, by_v = np.empty((p, count)), np.empty((p, count)), np.empty((p, count))
+    model, weight = np.empty((p + PLANE, count)), pixels[TRUST] ** 2
     factor, coefficients = np.empty((p + PLANE, p + PLANE)), np.empty((CHANNELS, p + PLANE))
     read(fine, per_px, reach, drawn_px, radius_px, u_steps, v_steps, places, pixels, value, by_u, by_v)
-    _fill(pixels, value, columns)
-    _fit_linear(pixels, columns, weight, first, last, factor, coefficients)
+    _fill(pixels, value, model)
+    _fit_linear(pixels, model, weight, first, last, factor, coefficients)
     total = 0.0
-    for i in range(count):
-        for channel in range(first, last):
-            rest = pixels[i, LUMA + channel]
-            for j in range(p + PLANE):
-                rest -= columns[i, j] * coefficients[channel, j]
-            total += weight[i] * rest * rest
+    for channel in range(first, last):
+        rest = pixels[LUMA + channel].copy()
+        _residual(model, coefficients[channel], rest)
+        total += dot(rest * weight, rest)
     return total
 
 
@@ -219,7 +229,7 @@ def _gauss_newton(
 ) -> None:
     """Fit from a start (u, v), pixels from the patch's middle; fill in u, v, covariance uu, uv, vv and misfit."""
     limit = 3 * per_px // 2  # a centre further from the middle pixel has run away
-    count = len(pixels)
+    count = pixels.shape[1]
     tukey, squares, normal = np.ones(count), np.empty(count), np.empty(5)
     freedom = misfit = det = 0.0
     for iteration in range(ITERATIONS):
@@ -265,21 +275,20 @@ def fit_centre(image: Image, ball: Expected) -> Centre | Reason:
     Source: Golub, Pereyra, "Separable nonlinear least squares", Inverse Problems 19 (2003), with Kaufman's
         approximation of the Jacobian; weights: Tukey's biweight.
     """
-    if not fits_in(image, ball):
+    extent = extent_of(ball)
+    if not fits_in(image, extent):
         return Reason.AT_BORDER
-    pixels = cut(image, ball)
-    luma = template_for(ball.radius_px, ball.response.luma_px, ball.shades, ball.half, ball.streak_px)
-    chroma = template_for(ball.radius_px, ball.response.chroma_px, ball.shades, ball.half, ball.streak_px)
-    (u, v), places = ball.middle, places_along(ball.streak_px, luma.per_px)
-    fit = np.empty(6)
-    start = ball.uv_px[0] - u, ball.uv_px[1] - v
-    _gauss_newton(
-        pixels, luma.fine, chroma.fine, luma.per_px, luma.reach, luma.radius_px, ball.radius_px, places, *start, fit
-    )
+    pixels, streak_px, fit = cut(image, extent, ball.response.gamma), ball.streak_px, np.empty(6)
+    luma = template_for(ball.radius_px, ball.response.luma_px, ball.shades, extent.half, streak_px)
+    chroma = template_for(ball.radius_px, ball.response.chroma_px, ball.shades, extent.half, streak_px)
+    n, places = luma.per_px, places_along(streak_px, luma.per_px)
+    start = extent.du, extent.dv
+    _gauss_newton(pixels, luma.fine, chroma.fine, n, luma.reach, luma.radius_px, ball.radius_px, places, *start, fit)
     du, dv, cov_uu, cov_uv, cov_vv, misfit = fit.tolist()
-    if not (du - start[0]) ** 2 + (dv - start[1]) ** 2 <= MAX_SHIFT_PX**2:
+    if not math.hypot(du - extent.du, dv - extent.dv) <= MAX_SHIFT_PX:
         return Reason.NO_BALL
-    return Centre(frozen_array((u + du, v + dv)), frozen_array(((cov_uu, cov_uv), (cov_uv, cov_vv))), misfit)
+    uv_px = frozen_array((extent.u + du, extent.v + dv))
+    return Centre(uv_px, frozen_array(((cov_uu, cov_uv), (cov_uv, cov_vv))), misfit)
 
 
 def misfit_at(pixels: Array, ball: Expected, centre: tuple[float, float], group: int) -> float:
@@ -291,7 +300,7 @@ def misfit_at(pixels: Array, ball: Expected, centre: tuple[float, float], group:
         group: 0 of brightness, 1 of colour.
     """
     blur_px = ball.response.chroma_px if group else ball.response.luma_px
-    template = template_for(ball.radius_px, blur_px, ball.shades, ball.half, ball.streak_px)
+    template = template_for(ball.radius_px, blur_px, ball.shades, extent_of(ball).half, ball.streak_px)
     n, places = template.per_px, places_along(ball.streak_px, template.per_px)
     u, v = (round(c * n) for c in centre)
     return _misfit(pixels, template.fine, n, template.reach, template.radius_px, ball.radius_px, places, u, v, group)

@@ -9,7 +9,7 @@ import numpy as np
 
 from tracker.centre import misfit_at
 from tracker.compiled import compiled
-from tracker.patch import LUMA, TRUST, Expected, Response, X, Y
+from tracker.patch import LUMA, TRUST, Expected, Response, X, Y, extent_of
 from tracker.solve import eliminate
 from tracker.template import BLUR_STEP_PX, TERMS, Vector, every_term, places_along, read, template_for
 from tracker.types import Array
@@ -61,17 +61,17 @@ def _stepped(now_px: float, less: bool, step_px: float) -> float:
 def _without_room(pixels: Array, terms: Array, products: Array) -> None:
     """Fill in the products of terms and brightness (m, m), m = PLANE + TERMS + 1, with the background taken out.
 
-    terms: (n, TERMS).  Their products stand after the PLANE first rows, the brightness's last, lower triangle.
+    terms: (TERMS, n).  Their products stand after the PLANE first rows, the brightness's last, lower triangle.
     """
     row = np.empty(len(products))
     products[:] = 0.0
-    for i in range(len(pixels)):
-        bare = 1.0 - terms[i, 0]
-        row[0], row[1], row[2] = bare, bare * pixels[i, X], bare * pixels[i, Y]
-        row[PLANE:-1] = terms[i]
-        row[-1] = pixels[i, LUMA]
+    for i in range(pixels.shape[1]):
+        bare = 1.0 - terms[0, i]
+        row[0], row[1], row[2] = bare, bare * pixels[X, i], bare * pixels[Y, i]
+        row[PLANE:-1] = terms[:, i]
+        row[-1] = pixels[LUMA, i]
         for j in range(len(row)):
-            weighted = pixels[i, TRUST] ** 2 * row[j]
+            weighted = pixels[TRUST, i] ** 2 * row[j]
             for k in range(j + 1):
                 products[j, k] += weighted * row[k]
     eliminate(products, PLANE)
@@ -88,9 +88,11 @@ def light_on(pixels: Array, ball: Expected, centre: tuple[float, float], lamp: V
     Returns:
         information (TERMS, TERMS), target (TERMS,) for `Light.learned`; None for a ball without brightness of its own.
     """
-    template = template_for(ball.radius_px, ball.response.luma_px, every_term(lamp), ball.half, ball.streak_px)
+    template = template_for(
+        ball.radius_px, ball.response.luma_px, every_term(lamp), extent_of(ball).half, ball.streak_px
+    )
     n = template.per_px
-    value, by_u, by_v = (np.empty((len(pixels), TERMS)) for _ in range(3))
+    value, by_u, by_v = (np.empty((TERMS, pixels.shape[1])) for _ in range(3))
     u, v = (round(c * n) for c in centre)
     places = places_along(ball.streak_px, n)
     read(template.fine, n, template.reach, template.radius_px, ball.radius_px, u, v, places, pixels, value, by_u, by_v)

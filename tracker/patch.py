@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -17,7 +18,7 @@ LEAST_NOISE = 1.5  # one sigma of quantisation and compression, grey levels
 DARKEST = 0.04  # below this share of white a camera's response is straight
 WHITE = 255.0
 X, Y, TRUST, LUMA, CHROMA_B, CHROMA_R = range(6)
-"""Columns of a patch: pixels from its middle, how far the pixel counts, and brightness and colour in units of noise."""
+"""Rows of a patch: pixels from its middle, how far the pixel counts, and brightness and colour in units of noise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,27 +55,34 @@ class Expected:
         """Return how far its image moves during the exposure [px]."""
         return self.speed_px_s[0] * self.response.exposure_s, self.speed_px_s[1] * self.response.exposure_s
 
-    @property
-    def edge_px(self) -> float:
-        """Return how far from its middle its image reaches [px]."""
-        return self.radius_px + min(float(np.hypot(*self.streak_px)), STREAK_MAX_PX) / 2.0
 
-    @property
-    def half(self) -> int:
-        """Return how far its patch must reach from the middle pixel [px]."""
-        return int(np.ceil(self.edge_px + MARGIN_PX))
+@dataclass(frozen=True, slots=True)
+class Extent:
+    """Which pixels belong to a ball.
 
-    @property
-    def middle(self) -> tuple[int, int]:
-        """Return its patch's middle pixel (u, v)."""
-        return round(self.uv_px[0]), round(self.uv_px[1])
+    u, v: the patch's middle pixel.  du, dv: where the ball is expected from there [px].
+    edge_px: how far its image reaches from its middle.  half: how far the patch reaches [px].
+    """
+
+    u: int
+    v: int
+    du: float
+    dv: float
+    edge_px: float
+    half: int
 
 
-def fits_in(image: Image, ball: Expected) -> bool:
+def extent_of(ball: Expected) -> Extent:
+    """Return which pixels belong to a ball."""
+    u, v = round(ball.uv_px[0]), round(ball.uv_px[1])
+    edge_px = ball.radius_px + min(math.hypot(*ball.streak_px), STREAK_MAX_PX) / 2.0
+    return Extent(u, v, ball.uv_px[0] - u, ball.uv_px[1] - v, edge_px, math.ceil(edge_px + MARGIN_PX))
+
+
+def fits_in(image: Image, extent: Extent) -> bool:
     """Say whether a ball's patch lies within its image."""
-    (u, v), half = ball.middle, ball.half
-    height, width = int(image.shape[0]), int(image.shape[1])
-    return half <= u < width - half and half <= v < height - half
+    height, width, half = int(image.shape[0]), int(image.shape[1]), extent.half
+    return half <= extent.u < width - half and half <= extent.v < height - half
 
 
 @lru_cache(maxsize=16)
@@ -123,14 +131,14 @@ def _whitening(image: Image, u: int, v: int, half: int, du: float, dv: float, be
 
 
 @compiled("f8[:, ::1](Array(uint8, 3, 'C', True), i8, i8, i8, f8, f8, f8, f8[::1], f8[::1])")
-def cut_pixels(
+def _cut_pixels(
     image: Image, u: int, v: int, half: int, du: float, dv: float, edge_px: float, light: Array, trust: Array
 ) -> Array:
     """Cut out and whiten; (u, v) is the middle pixel, (du, dv) the ball's place from there."""
     side = 2 * half + 1
     scale = np.zeros(6)
     _whitening(image, u, v, half, du, dv, edge_px + RING_PX, scale)
-    pixels = np.empty((side * side, 6))
+    pixels = np.empty((6, side * side))
     count = 0
     for y in range(-half, half + 1):
         for x in range(-half, half + 1):
@@ -142,22 +150,21 @@ def cut_pixels(
             luma = 0.114 * lb + 0.587 * lg + 0.299 * lr
             blue = 0.5 * lb - 0.331264 * lg - 0.168736 * lr
             red = -0.081312 * lb - 0.418688 * lg + 0.5 * lr
-            pixels[count, X] = x
-            pixels[count, Y] = y
-            pixels[count, TRUST] = trust[int(brightness + 0.5)]
-            pixels[count, LUMA] = luma * scale[0]
-            pixels[count, CHROMA_B] = blue * scale[1]
-            pixels[count, CHROMA_R] = red * scale[2] - blue * scale[3]
+            pixels[X, count] = x
+            pixels[Y, count] = y
+            pixels[TRUST, count] = trust[int(brightness + 0.5)]
+            pixels[LUMA, count] = luma * scale[0]
+            pixels[CHROMA_B, count] = blue * scale[1]
+            pixels[CHROMA_R, count] = red * scale[2] - blue * scale[3]
             count += 1
-    return pixels[:count].copy()
+    return pixels[:, :count].copy()
 
 
-def cut(image: Image, ball: Expected) -> Array:
-    """Cut out the pixels of a ball whose patch lies within its image (n, 6): see the columns' names.
+def cut(image: Image, extent: Extent, gamma: float) -> Array:
+    """Cut out the pixels of a ball whose patch lies within its image (6, n): see the rows' names.
 
     Light is undone of the camera's gamma, since ball and background mix as light; a pixel's trust falls as gamma
     spreads its noise. Brightness and colour are scaled by what the ring round the ball varies, in grey levels.
     """
-    (u, v), gamma = ball.middle, ball.response.gamma
-    offset = ball.uv_px[0] - u, ball.uv_px[1] - v
-    return cut_pixels(image, u, v, ball.half, *offset, ball.edge_px, light_of(gamma), trust_of(gamma))
+    e = extent
+    return _cut_pixels(image, e.u, e.v, e.half, e.du, e.dv, e.edge_px, light_of(gamma), trust_of(gamma))

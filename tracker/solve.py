@@ -10,6 +10,15 @@ from tracker.types import Array
 TINY = 1e-9
 
 
+@compiled("f8(f8[::1], f8[::1])")
+def dot(a: Array, b: Array) -> float:
+    """Return the sum of products."""
+    total = 0.0
+    for i in range(len(a)):
+        total += a[i] * b[i]
+    return total
+
+
 @compiled("void(f8[:, ::1])")
 def cholesky(A: Array) -> None:
     """Turn the lower triangle of a positive definite matrix (m, m) into its Cholesky factor, in place."""

@@ -75,11 +75,16 @@ def template_for(radius_px: float, blur_px: float, shades: Shades, half: int, st
 
 def places_along(streak_px: Streak, per_px: int) -> NDArray[np.int64]:
     """Return where along a streak the ball is drawn (k, 2): steps in u and v from its middle [1/per_px px]."""
-    length = math.hypot(*streak_px)
+    return _places(round(streak_px[0] * per_px), round(streak_px[1] * per_px), per_px)
+
+
+@lru_cache(maxsize=4096)
+def _places(u_steps: int, v_steps: int, per_px: int) -> NDArray[np.int64]:
+    length = math.hypot(u_steps, v_steps) / per_px
     shrink = min(1.0, STREAK_MAX_PX / length) if length > 0.0 else 0.0
     count = math.ceil(2.0 * length * shrink) | 1
-    along = ((np.arange(count) + 0.5) / count - 0.5) * (shrink * per_px)
-    places: NDArray[np.int64] = np.rint(along[:, None] * np.array(streak_px)).astype(np.int64)
+    along = ((np.arange(count) + 0.5) / count - 0.5) * shrink
+    places: NDArray[np.int64] = np.rint(along[:, None] * np.array((u_steps, v_steps))).astype(np.int64)
     return places
 
 
@@ -174,26 +179,27 @@ def read(
             up about its centre, d/dr = (x d/du + y d/dv) / r, since d/du = -d/dx; the blur grows with it, by a
             percent.
         places (k, 2): of the ball along its streak, see `places_along`.
-        pixels (n, ...): the patch, x and y in its first columns.
-        value, by_u, by_v (n, p): the shapes, and their slopes by the centre's u and v [1/px], to be filled in.
+        pixels (..., n): the patch, x and y in its first rows.
+        value, by_u, by_v (p, n): the shapes, and their slopes by the centre's u and v [1/px], to be filled in.
     """
-    shapes = value.shape[1]
+    shapes = len(value)
     mean = 1.0 / len(places)
     slope = mean * per_px / 2.0
     share = (radius_px - drawn_px) / drawn_px
-    for i in range(len(pixels)):
-        x, y = pixels[i, 0], pixels[i, 1]
-        row, column = int((reach + y) * per_px) - v_steps, int((reach + x) * per_px) - u_steps
-        for p in range(shapes):
-            value[i, p] = by_u[i, p] = by_v[i, p] = 0.0
-        for k in range(len(places)):
-            r, c = row - places[k, 1], column - places[k, 0]
+    value[:] = 0.0
+    by_u[:] = 0.0
+    by_v[:] = 0.0
+    for k in range(len(places)):
+        top, left = reach * per_px - v_steps - places[k, 1], reach * per_px - u_steps - places[k, 0]
+        for i in range(pixels.shape[1]):
+            r, c = top + int(pixels[1, i]) * per_px, left + int(pixels[0, i]) * per_px
             for p in range(shapes):
-                value[i, p] += fine[r, c, p]
-                by_u[i, p] += fine[r, c - 1, p] - fine[r, c + 1, p]
-                by_v[i, p] += fine[r - 1, c, p] - fine[r + 1, c, p]
-        along_u, along_v = (x - u_steps / per_px) * share, (y - v_steps / per_px) * share
-        for p in range(shapes):
-            by_u[i, p] *= slope
-            by_v[i, p] *= slope
-            value[i, p] = value[i, p] * mean + along_u * by_u[i, p] + along_v * by_v[i, p]
+                value[p, i] += fine[r, c, p]
+                by_u[p, i] += fine[r, c - 1, p] - fine[r, c + 1, p]
+                by_v[p, i] += fine[r - 1, c, p] - fine[r + 1, c, p]
+    for p in range(shapes):
+        for i in range(pixels.shape[1]):
+            by_u[p, i] *= slope
+            by_v[p, i] *= slope
+            along_u, along_v = (pixels[0, i] - u_steps / per_px) * share, (pixels[1, i] - v_steps / per_px) * share
+            value[p, i] = value[p, i] * mean + along_u * by_u[p, i] + along_v * by_v[p, i]
