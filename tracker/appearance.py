@@ -11,7 +11,7 @@ from tracker.camera import Camera
 from tracker.centre import Centre
 from tracker.lesson import light_on, sharper
 from tracker.light import Light, ray_frame
-from tracker.patch import Expected, Response, cut, extent_of
+from tracker.patch import Expected, Response, cut, detail_of, extent_of
 from tracker.template import FLAT, Shades
 from tracker.types import Array, Image
 
@@ -28,6 +28,7 @@ PUBLISH_AT = (
     288,
 )  # balls learned when templates follow the light, then every last of these
 BLUR_STEP_PX, FIRST_STEP_PX = 0.03, 0.15
+DETAIL_SHARE = 0.05  # of the newest ball in what is known of the camera's colour detail
 MISFIT_MAX = 2.0  # an image that fits no ball teaches nothing
 
 
@@ -79,11 +80,13 @@ class Appearance:
         if found.misfit > MISFIT_MAX:
             return self
         extent = extent_of(ball)
-        pixels = cut(image, extent, ball.response.gamma)
+        patch = cut(image, extent, ball.response)
         centre = float(found.uv_px[0]) - extent.u, float(found.uv_px[1]) - extent.v
-        response = sharper(pixels, ball, centre, max(BLUR_STEP_PX, FIRST_STEP_PX / (1.0 + self.light.count / 6.0)))
+        response = sharper(patch, ball, centre, max(BLUR_STEP_PX, FIRST_STEP_PX / (1.0 + self.light.count / 6.0)))
+        detail = response.detail + DETAIL_SHARE * (detail_of(image, extent) - response.detail)
+        response = replace(response, detail=detail)
         R_RtoW = ray_frame(camera.bearings(found.uv_px[None])[0], camera.R_CtoW)
-        equations = light_on(pixels, ball, centre, self.light.lamp_seen(R_RtoW))
+        equations = light_on(patch, ball, centre, self.light.lamp_seen(R_RtoW))
         light = self.light if equations is None else self.light.learned(*equations, R_RtoW)
         due = light.count in PUBLISH_AT or light.count % PUBLISH_AT[-1] == 0
         shown = light if due and light.trusted else self.shown

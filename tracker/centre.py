@@ -11,17 +11,18 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from enum import Enum, auto
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tracker.compiled import compiled
-from tracker.patch import LUMA, TRUST, Expected, X, Y, cut, extent_of, fits_in
+from tracker.patch import LUMA, TRUST, Expected, Patch, X, Y, cut, extent_of, fits_in
 from tracker.solve import cholesky, dot, lower, solve
 from tracker.template import places_along, read, template_for
 from tracker.types import Array, Image, Reason, frozen_array
 
-CHANNELS, PLANE = 3, 3  # brightness and two of colour; terms of the background
+PLANE = 3  # terms of the background
 TUKEY = 4.0
 LEAST_WEIGHT = 1e-3
 ITERATIONS = 5
@@ -29,6 +30,13 @@ ROUGH_PX = 0.5
 CONVERGED_PX = 0.02  # of the last step; what is left after it is far smaller
 MAX_SHIFT_PX = 1.5
 RIDGE = 1.0 + 1e-9
+
+
+class Group(Enum):
+    """What is blurred alike."""
+
+    BRIGHTNESS = auto()
+    COLOUR = auto()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -55,11 +63,9 @@ def _fill(pixels: Array, value: Array, model: Array) -> None:
         model[p + 2, i] = bare * pixels[Y, i]
 
 
-@compiled("void(f8[:, ::1], f8[:, ::1], f8[::1], i8, i8, f8[:, ::1], f8[:, ::1])")
-def _fit_linear(
-    pixels: Array, model: Array, weight: Array, first: int, last: int, factor: Array, coefficients: Array
-) -> None:
-    """Solve for the linear coefficients of channels first to last - 1 (3, m), which are blurred alike.
+@compiled("void(f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1])")
+def _fit_linear(pixels: Array, model: Array, weight: Array, factor: Array, coefficients: Array) -> None:
+    """Solve for the linear coefficients of each channel (channels, m).
 
     Args:
         model (m, n).  weight (n,): of each pixel.  factor (m, m): Cholesky's, filled in.
@@ -71,10 +77,10 @@ def _fit_linear(
         for k in range(j + 1):
             factor[j, k] = dot(weighted, model[k])
         factor[j, j] *= RIDGE
-        for channel in range(first, last):
+        for channel in range(len(coefficients)):
             coefficients[channel, j] = dot(weighted, pixels[LUMA + channel])
     cholesky(factor)
-    for channel in range(first, last):
+    for channel in range(len(coefficients)):
         solve(factor, coefficients[channel])
 
 
@@ -127,7 +133,7 @@ def _add_channel(
     _slope(pixels, by_v, c, slope_v)
     weighted_u, weighted_v = weight * slope_u, weight * slope_v
     for i in range(n):
-        squares[i] += (pixels[TRUST, i] * rest[i]) ** 2 / CHANNELS
+        squares[i] += (pixels[TRUST, i] * rest[i]) ** 2
     normal[0] += dot(weighted_u, slope_u)
     normal[1] += dot(weighted_u, slope_v)
     normal[2] += dot(weighted_v, slope_v)
@@ -145,13 +151,11 @@ def _add_channel(
 
 
 @compiled(
-    "void(f8[:, ::1], Array(float32, 3, 'C', True), Array(float32, 3, 'C', True), i8, i8, f8, f8, i8[:, ::1],"
-    "i8, i8, f8[::1], f8[::1], f8[::1])"
+    "void(f8[:, ::1], Array(float32, 3, 'C', True), i8, i8, f8, f8, i8[:, ::1], i8, i8, f8[::1], f8[::1], f8[::1])"
 )
 def _linearise(
     pixels: Array,
-    luma: NDArray[np.float32],
-    chroma: NDArray[np.float32],
+    fine: NDArray[np.float32],
     per_px: int,
     reach: int,
     drawn_px: float,
@@ -163,25 +167,47 @@ def _linearise(
     squares: Array,
     normal: Array,
 ) -> None:
-    """Linearise about a centre at (u_steps, v_steps) / per_px; fill in squares and normal as `_add_channel` does."""
-    count, p = pixels.shape[1], luma.shape[2]
+    """Linearise the brightness or the colour of a patch about a centre at (u_steps, v_steps) / per_px.
+
+    Fills in squares (n,) and normal (5,) as `_add_channel` does.
+    """
+    count, p, channels = pixels.shape[1], fine.shape[2], len(pixels) - LUMA
     weight = (tukey * pixels[TRUST]) ** 2
     model = np.empty((p + PLANE, count))
     value, by_u, by_v = np.empty((p, count)), np.empty((p, count)), np.empty((p, count))
-    factor, coefficients = np.empty((p + PLANE, p + PLANE)), np.empty((CHANNELS, p + PLANE))
+    factor, coefficients = np.empty((p + PLANE, p + PLANE)), np.empty((channels, p + PLANE))
     squares[:] = 0.0
     normal[:] = 0.0
-    for first, last, fine in ((0, 1, luma), (1, CHANNELS, chroma)):
-        read(fine, per_px, reach, drawn_px, radius_px, u_steps, v_steps, places, pixels, value, by_u, by_v)
-        _fill(pixels, value, model)
-        _fit_linear(pixels, model, weight, first, last, factor, coefficients)
-        for channel in range(first, last):
-            c = coefficients[channel]
-            _add_channel(pixels, model, by_u, by_v, weight, channel, factor, c, squares, normal)
+    read(fine, per_px, reach, drawn_px, radius_px, u_steps, v_steps, places, pixels, value, by_u, by_v)
+    _fill(pixels, value, model)
+    _fit_linear(pixels, model, weight, factor, coefficients)
+    for channel in range(channels):
+        c = coefficients[channel]
+        _add_channel(pixels, model, by_u, by_v, weight, channel, factor, c, squares, normal)
 
 
-@compiled("f8(f8[:, ::1], Array(float32, 3, 'C', True), i8, i8, f8, f8, i8[:, ::1], i8, i8, i8)")
-def _misfit(
+@compiled("f8(f8[::1], f8[::1], i8, i8, f8[::1])")
+def _misfit(squares: Array, tukey: Array, channels: int, shapes: int, normal: Array) -> float:
+    """Return chi2 per degree of freedom of brightness or colour, and weaken normal (5,) where it is above 1."""
+    freedom, total = -float(channels * (shapes + PLANE)), 0.0
+    for i in range(len(squares)):
+        freedom += channels * tukey[i] ** 2
+        total += squares[i] * tukey[i] ** 2
+    misfit = total / max(1.0, freedom)
+    normal /= max(1.0, misfit)
+    return misfit
+
+
+@compiled("void(f8[::1], i8, f8[::1])")
+def _doubt(squares: Array, channels: int, tukey: Array) -> None:
+    """Fill in the weights of Tukey's biweight, square roots."""
+    scale = max(1.0, float(np.median(squares)) / channels)
+    for i in range(len(squares)):
+        tukey[i] = max(LEAST_WEIGHT, 1.0 - squares[i] / channels / (TUKEY**2 * scale))
+
+
+@compiled("f8(f8[:, ::1], Array(float32, 3, 'C', True), i8, i8, f8, f8, i8[:, ::1], i8, i8)")
+def _squares_at(
     pixels: Array,
     fine: NDArray[np.float32],
     per_px: int,
@@ -191,19 +217,17 @@ def _misfit(
     places: NDArray[np.int64],
     u_steps: int,
     v_steps: int,
-    group: int,
 ) -> float:
-    """Return the sum of squares left in brightness (group 0) or colour (1) at a centre on the grid."""
-    count, p = pixels.shape[1], fine.shape[2]
-    first, last = (0, 1) if group == 0 else (1, CHANNELS)
+    """Return the sum of squares left in brightness or colour at a centre on the grid."""
+    count, p, channels = pixels.shape[1], fine.shape[2], len(pixels) - LUMA
     value, by_u, by_v = np.empty((p, count)), np.empty((p, count)), np.empty((p, count))
     model, weight = np.empty((p + PLANE, count)), pixels[TRUST] ** 2
-    factor, coefficients = np.empty((p + PLANE, p + PLANE)), np.empty((CHANNELS, p + PLANE))
+    factor, coefficients = np.empty((p + PLANE, p + PLANE)), np.empty((channels, p + PLANE))
     read(fine, per_px, reach, drawn_px, radius_px, u_steps, v_steps, places, pixels, value, by_u, by_v)
     _fill(pixels, value, model)
-    _fit_linear(pixels, model, weight, first, last, factor, coefficients)
+    _fit_linear(pixels, model, weight, factor, coefficients)
     total = 0.0
-    for channel in range(first, last):
+    for channel in range(channels):
         rest = pixels[LUMA + channel].copy()
         _residual(model, coefficients[channel], rest)
         total += dot(rest * weight, rest)
@@ -211,11 +235,12 @@ def _misfit(
 
 
 @compiled(
-    "void(f8[:, ::1], Array(float32, 3, 'C', True), Array(float32, 3, 'C', True), i8, i8, f8, f8, i8[:, ::1],"
-    "f8, f8, f8[::1])"
+    "void(f8[:, ::1], f8[:, ::1], Array(float32, 3, 'C', True), Array(float32, 3, 'C', True), i8, i8, f8, f8,"
+    "i8[:, ::1], f8, f8, f8[::1])"
 )
 def _gauss_newton(
-    pixels: Array,
+    bright: Array,
+    colour: Array,
     luma: NDArray[np.float32],
     chroma: NDArray[np.float32],
     per_px: int,
@@ -229,38 +254,37 @@ def _gauss_newton(
 ) -> None:
     """Fit from a start (u, v), pixels from the patch's middle; fill in u, v, covariance uu, uv, vv and misfit."""
     limit = 3 * per_px // 2  # a centre further from the middle pixel has run away
-    count = pixels.shape[1]
-    tukey, squares, normal = np.ones(count), np.empty(count), np.empty(5)
-    freedom = misfit = det = 0.0
+    p, n_bright, n_colour = luma.shape[2], bright.shape[1], colour.shape[1]
+    tukey_b, tukey_c, squares_b, squares_c = (
+        np.ones(n_bright),
+        np.ones(n_colour),
+        np.empty(n_bright),
+        np.empty(n_colour),
+    )
+    normal, normal_c = np.empty(5), np.empty(5)
+    misfit = det = 0.0
     for iteration in range(ITERATIONS):
-        u_steps = max(-limit, min(limit, round(u * per_px)))
-        v_steps = max(-limit, min(limit, round(v * per_px)))
-        _linearise(
-            pixels, luma, chroma, per_px, reach, drawn_px, radius_px, places, u_steps, v_steps, tukey, squares, normal
-        )
+        us, vs = max(-limit, min(limit, round(u * per_px))), max(-limit, min(limit, round(v * per_px)))
+        _linearise(bright, luma, per_px, reach, drawn_px, radius_px, places, us, vs, tukey_b, squares_b, normal)
+        _linearise(colour, chroma, per_px, reach, drawn_px, radius_px, places, us, vs, tukey_c, squares_c, normal_c)
+        misfit_b = _misfit(squares_b, tukey_b, 1, p, normal)
+        misfit_c = _misfit(squares_c, tukey_c, 2, p, normal_c)
+        misfit = (misfit_b * n_bright + misfit_c * 2 * n_colour) / (n_bright + 2 * n_colour)
+        normal += normal_c
         det = normal[0] * normal[2] - normal[1] * normal[1]
         step_u = (normal[2] * normal[3] - normal[1] * normal[4]) / det
         step_v = (normal[0] * normal[4] - normal[1] * normal[3]) / det
-        new_u = u_steps / per_px + min(1.0, max(-1.0, step_u))
-        new_v = v_steps / per_px + min(1.0, max(-1.0, step_v))
+        new_u = us / per_px + min(1.0, max(-1.0, step_u))
+        new_v = vs / per_px + min(1.0, max(-1.0, step_v))
         moved = max(abs(new_u - u), abs(new_v - v))
         u, v = new_u, new_v
-        freedom = -CHANNELS * (luma.shape[2] + PLANE) - 2.0
-        misfit = 0.0
-        for i in range(count):
-            freedom += CHANNELS * tukey[i] ** 2
-            misfit += CHANNELS * squares[i] * tukey[i] ** 2
         if moved < CONVERGED_PX and iteration > 0:
             break
-        if moved > ROUGH_PX:
-            continue  # weights now would hold the wrong place fast
-        scale = max(1.0, float(np.median(squares)))
-        for i in range(count):
-            tukey[i] = max(LEAST_WEIGHT, 1.0 - squares[i] / (TUKEY**2 * scale))
-    misfit /= max(1.0, freedom)
-    excess = max(1.0, misfit) / det
+        if moved <= ROUGH_PX:  # weights before that would hold the wrong place fast
+            _doubt(squares_b, 1, tukey_b)
+            _doubt(squares_c, 2, tukey_c)
     fit[0], fit[1] = u, v
-    fit[2], fit[3], fit[4] = normal[2] * excess, -normal[1] * excess, normal[0] * excess
+    fit[2], fit[3], fit[4] = normal[2] / det, -normal[1] / det, normal[0] / det
     fit[5] = misfit
 
 
@@ -278,12 +302,14 @@ def fit_centre(image: Image, ball: Expected) -> Centre | Reason:
     extent = extent_of(ball)
     if not fits_in(image, extent):
         return Reason.AT_BORDER
-    pixels, streak_px, fit = cut(image, extent, ball.response.gamma), ball.streak_px, np.empty(6)
+    patch, streak_px, fit = cut(image, extent, ball.response), ball.streak_px, np.empty(6)
     luma = template_for(ball.radius_px, ball.response.luma_px, ball.shades, extent.half, streak_px)
-    chroma = template_for(ball.radius_px, ball.response.chroma_px, ball.shades, extent.half, streak_px)
+    chroma = template_for(
+        ball.radius_px, ball.response.chroma_px, ball.shades, extent.half, streak_px, ball.response.block_px
+    )
     n, places = luma.per_px, places_along(streak_px, luma.per_px)
-    start = extent.du, extent.dv
-    _gauss_newton(pixels, luma.fine, chroma.fine, n, luma.reach, luma.radius_px, ball.radius_px, places, *start, fit)
+    shapes = luma.fine, chroma.fine, n, luma.reach, luma.radius_px
+    _gauss_newton(patch.bright, patch.colour, *shapes, ball.radius_px, places, extent.du, extent.dv, fit)
     du, dv, cov_uu, cov_uv, cov_vv, misfit = fit.tolist()
     if not math.hypot(du - extent.du, dv - extent.dv) <= MAX_SHIFT_PX:
         return Reason.NO_BALL
@@ -291,16 +317,15 @@ def fit_centre(image: Image, ball: Expected) -> Centre | Reason:
     return Centre(uv_px, frozen_array(((cov_uu, cov_uv), (cov_uv, cov_vv))), misfit)
 
 
-def misfit_at(pixels: Array, ball: Expected, centre: tuple[float, float], group: int) -> float:
-    """Return the sum of squares that a ball's fit leaves at a given centre.
+def misfit_at(patch: Patch, ball: Expected, centre: tuple[float, float], group: Group) -> float:
+    """Return the sum of squares that a ball's fit leaves in its brightness or its colour at a given centre.
 
-    Args:
-        pixels: the ball's patch.
-        centre: from the patch's middle pixel [px].
-        group: 0 of brightness, 1 of colour.
+    centre: from the patch's middle pixel [px].
     """
-    blur_px = ball.response.chroma_px if group else ball.response.luma_px
-    template = template_for(ball.radius_px, blur_px, ball.shades, extent_of(ball).half, ball.streak_px)
+    bright = group is Group.BRIGHTNESS
+    blur_px, box_px = (ball.response.luma_px, 1) if bright else (ball.response.chroma_px, ball.response.block_px)
+    template = template_for(ball.radius_px, blur_px, ball.shades, extent_of(ball).half, ball.streak_px, box_px)
     n, places = template.per_px, places_along(ball.streak_px, template.per_px)
     u, v = (round(c * n) for c in centre)
-    return _misfit(pixels, template.fine, n, template.reach, template.radius_px, ball.radius_px, places, u, v, group)
+    pixels = patch.bright if bright else patch.colour
+    return _squares_at(pixels, template.fine, n, template.reach, template.radius_px, ball.radius_px, places, u, v)

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from tracker.centre import misfit_at
+from tracker.centre import Group, misfit_at
 from tracker.compiled import compiled
-from tracker.patch import LUMA, TRUST, Expected, Response, X, Y, extent_of
+from tracker.patch import LUMA, TRUST, Expected, Patch, Response, X, Y, extent_of
 from tracker.solve import eliminate
 from tracker.template import BLUR_STEP_PX, TERMS, Vector, every_term, places_along, read, template_for
 from tracker.types import Array
@@ -18,32 +18,31 @@ BLUR_MAX_PX = 1.5
 EXPOSURE_TRIAL_S, EXPOSURE_STEP_S, EXPOSURE_MAX_S = 0.001, 0.00025, 0.02
 LEAST_STREAK_PX = 0.2  # a trial that moves the ball's ends by less shows nothing
 PLANE = 3
-LUMA_GROUP, CHROMA_GROUP = 0, 1
 
 
-def sharper(pixels: Array, ball: Expected, centre: tuple[float, float], step_px: float) -> Response:
+def sharper(patch: Patch, ball: Expected, centre: tuple[float, float], step_px: float) -> Response:
     """Return the camera's response, its blurs and exposure moved one step to where the ball fits better.
 
     Args:
-        pixels: the ball's patch.
+        patch: the ball's.
         centre: as fitted, from the patch's middle pixel [px].
     """
     now, trial_px = ball.response, max(step_px, BLUR_STEP_PX)
 
-    def tried(group: int, **change: float) -> float:
+    def tried(group: Group, **change: float) -> float:
         changed = replace(ball, response=replace(now, **change))
-        return misfit_at(pixels, changed, centre, group)
+        return misfit_at(patch, changed, centre, group)
 
-    less_luma = tried(LUMA_GROUP, luma_px=max(0.0, now.luma_px - trial_px)) < tried(
-        LUMA_GROUP, luma_px=now.luma_px + trial_px
+    less_luma = tried(Group.BRIGHTNESS, luma_px=max(0.0, now.luma_px - trial_px)) < tried(
+        Group.BRIGHTNESS, luma_px=now.luma_px + trial_px
     )
-    less_chroma = tried(CHROMA_GROUP, chroma_px=max(0.0, now.chroma_px - trial_px)) < tried(
-        CHROMA_GROUP, chroma_px=now.chroma_px + trial_px
+    less_chroma = tried(Group.COLOUR, chroma_px=max(0.0, now.chroma_px - trial_px)) < tried(
+        Group.COLOUR, chroma_px=now.chroma_px + trial_px
     )
     exposure_s = now.exposure_s
     if math.hypot(*ball.speed_px_s) * EXPOSURE_TRIAL_S > LEAST_STREAK_PX:
         shorter, longer = max(0.0, exposure_s - EXPOSURE_TRIAL_S), exposure_s + EXPOSURE_TRIAL_S
-        less = tried(LUMA_GROUP, exposure_s=shorter) < tried(LUMA_GROUP, exposure_s=longer)
+        less = tried(Group.BRIGHTNESS, exposure_s=shorter) < tried(Group.BRIGHTNESS, exposure_s=longer)
         exposure_s = min(EXPOSURE_MAX_S, max(0.0, exposure_s + (-EXPOSURE_STEP_S if less else EXPOSURE_STEP_S)))
     return replace(
         now,
@@ -77,11 +76,11 @@ def _without_room(pixels: Array, terms: Array, products: Array) -> None:
     eliminate(products, PLANE)
 
 
-def light_on(pixels: Array, ball: Expected, centre: tuple[float, float], lamp: Vector) -> tuple[Array, Array] | None:
+def light_on(patch: Patch, ball: Expected, centre: tuple[float, float], lamp: Vector) -> tuple[Array, Array] | None:
     """Return the normal equations of the light's terms on a ball, at mean brightness 1.
 
     Args:
-        pixels: its patch.
+        patch: its pixels.
         ball: what is known of it.
         centre: as fitted, from the patch's middle pixel [px].
         lamp: the lamp as seen along the ball's ray.
@@ -91,7 +90,7 @@ def light_on(pixels: Array, ball: Expected, centre: tuple[float, float], lamp: V
     template = template_for(
         ball.radius_px, ball.response.luma_px, every_term(lamp), extent_of(ball).half, ball.streak_px
     )
-    n = template.per_px
+    n, pixels = template.per_px, patch.bright
     value, by_u, by_v = (np.empty((TERMS, pixels.shape[1])) for _ in range(3))
     u, v = (round(c * n) for c in centre)
     places = places_along(ball.streak_px, n)

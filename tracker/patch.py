@@ -17,8 +17,23 @@ RING_PX = 1.5  # the background's own variation is measured from this far beyond
 LEAST_NOISE = 1.5  # one sigma of quantisation and compression, grey levels
 DARKEST = 0.04  # below this share of white a camera's response is straight
 WHITE = 255.0
-X, Y, TRUST, LUMA, CHROMA_B, CHROMA_R = range(6)
-"""Rows of a patch: pixels from its middle, how far the pixel counts, and brightness and colour in units of noise."""
+SUBSAMPLED_PX = 2  # most cameras and JPEG keep colour by blocks of 2 x 2 pixels, which begin at even ones
+FULL_DETAIL = 0.75  # above this share of what neighbours of different blocks differ by, colour is kept by the pixel
+X, Y, TRUST, LUMA = range(4)
+BLUE, RED = 3, 4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Patch:
+    """The pixels round a ball.
+
+    bright (4, n): for each pixel X, Y from the middle pixel [px], TRUST, how far it counts, and LUMA.
+    colour (5, n or n / 4): for each pixel or block of 2 x 2 X, Y of its middle, TRUST, BLUE and RED difference.
+    LUMA, BLUE and RED are in units of their noise.
+    """
+
+    bright: Array
+    colour: Array
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,12 +43,19 @@ class Response:
     luma_px, chroma_px: blur of brightness and colour, one sigma of a round kernel, the pixel's box aside [px].
     exposure_s: how long the shutter stands open [s].
     gamma: grey levels are light to the power of 1 / gamma.
+    detail: mean square difference in colour of neighbours in one block of 2 x 2 pixels over that across blocks.
     """
 
     luma_px: float = 0.4
     chroma_px: float = 0.7
     exposure_s: float = 0.004
     gamma: float = 1.0
+    detail: float = 0.0
+
+    @property
+    def block_px(self) -> int:
+        """Return the side of the squares by which colour is kept [px]."""
+        return 1 if self.detail > FULL_DETAIL else SUBSAMPLED_PX
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,73 +120,131 @@ def trust_of(gamma: float) -> Array:
     return np.asarray(1.0 / (gamma * share ** (gamma - 1.0)))
 
 
-@compiled("void(Array(uint8, 3, 'C', True), i8, i8, i8, f8, f8, f8, f8[::1])")
-def _whitening(image: Image, u: int, v: int, half: int, du: float, dv: float, beyond_px: float, scale: Array) -> None:
+@compiled("void(Array(uint8, 3, 'C', True), i8, i8, i8, f8[::1])")
+def _colour_of_block(image: Image, left: int, top: int, block: int, colour: Array) -> None:
+    """Fill in the mean luma, blue and red difference (ITU-R BT.601) of a block of pixels, in grey levels."""
+    b = g = r = 0.0
+    for v in range(top, top + block):
+        for u in range(left, left + block):
+            b += image[v, u, 0] / block**2
+            g += image[v, u, 1] / block**2
+            r += image[v, u, 2] / block**2
+    colour[0] = 0.114 * b + 0.587 * g + 0.299 * r
+    colour[1] = 0.5 * b - 0.331264 * g - 0.168736 * r
+    colour[2] = -0.081312 * b - 0.418688 * g + 0.5 * r
+
+
+@compiled("void(Array(uint8, 3, 'C', True), i8, i8, i8, i8, f8, f8, f8, f8[::1])")
+def _whitening(
+    image: Image, u: int, v: int, half: int, block: int, du: float, dv: float, beyond_px: float, scale: Array
+) -> None:
     """Find the scales of luma and of the two colour differences by the background's variation about a plane.
 
-    BGR turns into luma, blue and red difference (ITU-R BT.601); colour is made white by Cholesky's factor.
+    Luma varies by pixel, colour by block; colour is made white by Cholesky's factor.
     """
-    rows = np.zeros((6, 6))  # of 1, x, y, luma, blue, red: their products' sums
-    one = np.empty(6)
-    for y in range(-half, half + 1):
-        for x in range(-half, half + 1):
+    bright, colour = np.zeros((4, 4)), np.zeros((5, 5))  # products of 1, x, y, luma; of 1, x, y, blue, red
+    one, mean = np.ones(5), np.empty(3)
+    for top in range(v - half + ((v - half) % block), v + half - block + 2, block):
+        for left in range(u - half + ((u - half) % block), u + half - block + 2, block):
+            x, y = left + (block - 1) / 2 - u, top + (block - 1) / 2 - v
             if (x - du) ** 2 + (y - dv) ** 2 <= beyond_px**2:
                 continue
-            b, g, r = image[v + y, u + x, 0], image[v + y, u + x, 1], image[v + y, u + x, 2]
-            one[0], one[1], one[2] = 1.0, x, y
-            one[3] = 0.114 * b + 0.587 * g + 0.299 * r
-            one[4] = 0.5 * b - 0.331264 * g - 0.168736 * r
-            one[5] = -0.081312 * b - 0.418688 * g + 0.5 * r
-            for i in range(6):
+            _colour_of_block(image, left, top, block, mean)
+            one[1], one[2], one[3], one[4] = x, y, mean[1], mean[2]
+            for i in range(5):
                 for j in range(i + 1):
-                    rows[i, j] += one[i] * one[j]
-    freedom = max(rows[0, 0] - 3.0, 1.0)
-    eliminate(rows, 3)
-    least = LEAST_NOISE**2
-    a = np.sqrt(max(rows[4, 4], 0.0) / freedom + least)
-    b_over_a = rows[5, 4] / freedom / a
-    c = np.sqrt(max(rows[5, 5] / freedom + least - b_over_a * b_over_a, least))
-    scale[0] = 1.0 / np.sqrt(max(rows[3, 3], 0.0) / freedom + least)
+                    colour[i, j] += one[i] * one[j]
+            for row in range(top, top + block):
+                for column in range(left, left + block):
+                    one[1], one[2] = column - u, row - v
+                    pixel = image[row, column]
+                    one[3] = 0.114 * pixel[0] + 0.587 * pixel[1] + 0.299 * pixel[2]
+                    for i in range(4):
+                        for j in range(i + 1):
+                            bright[i, j] += one[i] * one[j]
+    eliminate(bright, 3)
+    eliminate(colour, 3)
+    least, freedom = LEAST_NOISE**2, max(colour[0, 0] - 3.0, 1.0)
+    scale[0] = 1.0 / np.sqrt(max(bright[3, 3], 0.0) / max(bright[0, 0] - 3.0, 1.0) + least)
+    a = np.sqrt(max(colour[3, 3], 0.0) / freedom + least / block)
+    b_over_a = colour[4, 3] / freedom / a
+    c = np.sqrt(max(colour[4, 4] / freedom + least / block - b_over_a * b_over_a, least / block))
     scale[1] = 1.0 / a
     scale[2] = 1.0 / c
     scale[3] = b_over_a / (a * c)
 
 
-@compiled("f8[:, ::1](Array(uint8, 3, 'C', True), i8, i8, i8, f8, f8, f8, f8[::1], f8[::1])")
+@compiled("i8(Array(uint8, 3, 'C', True), i8, i8, i8, i8, f8, f8, f8, f8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")
 def _cut_pixels(
-    image: Image, u: int, v: int, half: int, du: float, dv: float, edge_px: float, light: Array, trust: Array
-) -> Array:
-    """Cut out and whiten; (u, v) is the middle pixel, (du, dv) the ball's place from there."""
-    side = 2 * half + 1
-    scale = np.zeros(6)
-    _whitening(image, u, v, half, du, dv, edge_px + RING_PX, scale)
-    pixels = np.empty((6, side * side))
-    count = 0
-    for y in range(-half, half + 1):
-        for x in range(-half, half + 1):
+    image: Image,
+    u: int,
+    v: int,
+    half: int,
+    block: int,
+    du: float,
+    dv: float,
+    edge_px: float,
+    light: Array,
+    trust: Array,
+    bright: Array,
+    colour: Array,
+) -> int:
+    """Cut out and whiten; (u, v) is the middle pixel, (du, dv) the ball's place from there. Returns the blocks."""
+    scale, count = np.zeros(4), 0
+    _whitening(image, u, v, half, block, du, dv, edge_px + RING_PX, scale)
+    for top in range(v - half + ((v - half) % block), v + half - block + 2, block):
+        for left in range(u - half + ((u - half) % block), u + half - block + 2, block):
+            x, y = left + (block - 1) / 2 - u, top + (block - 1) / 2 - v
             if (x - du) ** 2 + (y - dv) ** 2 >= (edge_px + MARGIN_PX) ** 2:
                 continue
-            b, g, r = image[v + y, u + x, 0], image[v + y, u + x, 1], image[v + y, u + x, 2]
-            brightness = 0.114 * b + 0.587 * g + 0.299 * r
-            lb, lg, lr = light[b], light[g], light[r]
-            luma = 0.114 * lb + 0.587 * lg + 0.299 * lr
-            blue = 0.5 * lb - 0.331264 * lg - 0.168736 * lr
-            red = -0.081312 * lb - 0.418688 * lg + 0.5 * lr
-            pixels[X, count] = x
-            pixels[Y, count] = y
-            pixels[TRUST, count] = trust[int(brightness + 0.5)]
-            pixels[LUMA, count] = luma * scale[0]
-            pixels[CHROMA_B, count] = blue * scale[1]
-            pixels[CHROMA_R, count] = red * scale[2] - blue * scale[3]
+            mean = blue = red = 0.0
+            for k in range(block**2):
+                row, column = top + k // block, left + k % block
+                b, g, r = image[row, column, 0], image[row, column, 1], image[row, column, 2]
+                lb, lg, lr = light[b], light[g], light[r]
+                brightness = 0.114 * b + 0.587 * g + 0.299 * r
+                mean += brightness / block**2
+                blue += (0.5 * lb - 0.331264 * lg - 0.168736 * lr) / block**2
+                red += (-0.081312 * lb - 0.418688 * lg + 0.5 * lr) / block**2
+                i = block**2 * count + k
+                bright[X, i] = column - u
+                bright[Y, i] = row - v
+                bright[TRUST, i] = trust[int(brightness + 0.5)]
+                bright[LUMA, i] = (0.114 * lb + 0.587 * lg + 0.299 * lr) * scale[0]
+            colour[X, count] = x
+            colour[Y, count] = y
+            colour[TRUST, count] = trust[int(mean + 0.5)]
+            colour[BLUE, count] = blue * scale[1]
+            colour[RED, count] = red * scale[2] - blue * scale[3]
             count += 1
-    return pixels[:, :count].copy()
+    return count
 
 
-def cut(image: Image, extent: Extent, gamma: float) -> Array:
-    """Cut out the pixels of a ball whose patch lies within its image (6, n): see the rows' names.
+def cut(image: Image, extent: Extent, response: Response) -> Patch:
+    """Cut out the pixels of a ball whose patch lies within its image.
 
     Light is undone of the camera's gamma, since ball and background mix as light; a pixel's trust falls as gamma
     spreads its noise. Brightness and colour are scaled by what the ring round the ball varies, in grey levels.
     """
-    e = extent
-    return _cut_pixels(image, e.u, e.v, e.half, e.du, e.dv, e.edge_px, light_of(gamma), trust_of(gamma))
+    e, pixels, block = extent, (2 * extent.half + 1) ** 2, response.block_px
+    bright, colour = np.empty((4, pixels)), np.empty((5, pixels))
+    light, trust = light_of(response.gamma), trust_of(response.gamma)
+    count = _cut_pixels(image, e.u, e.v, e.half, block, e.du, e.dv, e.edge_px, light, trust, bright, colour)
+    return Patch(np.ascontiguousarray(bright[:, : count * block**2]), np.ascontiguousarray(colour[:, :count]))
+
+
+@compiled("f8(Array(uint8, 3, 'C', True), i8, i8, i8)")
+def _detail(image: Image, u: int, v: int, half: int) -> float:
+    """Compare neighbours in a row, in the same block of 2 x 2 pixels and in two."""
+    here, there, squares = np.empty(3), np.empty(3), np.zeros(2)
+    for row in range(v - half, v + half + 1):
+        for column in range(u - half, u + half):
+            _colour_of_block(image, column, row, 1, here)
+            _colour_of_block(image, column + 1, row, 1, there)
+            squares[column % 2] += (here[1] - there[1]) ** 2 + (here[2] - there[2]) ** 2
+    return float(squares[0] / max(squares[1], 1.0))
+
+
+def detail_of(image: Image, extent: Extent) -> float:
+    """Return `Response.detail` as one ball's patch shows it."""
+    return _detail(image, extent.u, extent.v, extent.half)

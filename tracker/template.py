@@ -64,13 +64,15 @@ class Template:
     radius_px: float
 
 
-def template_for(radius_px: float, blur_px: float, shades: Shades, half: int, streak_px: Streak) -> Template:
+def template_for(
+    radius_px: float, blur_px: float, shades: Shades, half: int, streak_px: Streak, box_px: int = 1
+) -> Template:
     """Return the template of a ball, large enough for patches of 2 half + 1 pixels and the ball's streak.
 
-    blur_px: one sigma of the lens's round kernel; the pixel's box comes on top.
+    blur_px: one sigma of the lens's round kernel.  box_px: side of the square that gathers light: a pixel, or a block.
     """
     reach = half + 2 + (0 if math.hypot(*streak_px) == 0.0 else round(STREAK_MAX_PX / 2.0))
-    return _draw(round(radius_px / RADIUS_STEP_PX), round(blur_px / BLUR_STEP_PX), shades, reach)
+    return _draw(round(radius_px / RADIUS_STEP_PX), round(blur_px / BLUR_STEP_PX), box_px, shades, reach)
 
 
 def places_along(streak_px: Streak, per_px: int) -> NDArray[np.int64]:
@@ -119,10 +121,10 @@ def _sharp(per_px: int, radius_px: float, border: int, lamp: Array, weights: Arr
     return shapes
 
 
-def _kernel(per_px: int, blur_px: float) -> NDArray[np.float32]:
+def _kernel(per_px: int, blur_px: float, box_px: int) -> NDArray[np.float32]:
     """Return the lens's and the pixel's blur along one axis of the grid."""
-    # A box of per_px + 1 samples with its ends at half weight is per_px wide and stays on the grid.
-    box = np.ones(per_px + 1) / per_px
+    # A box of n + 1 samples with its ends at half weight is n wide and stays on the grid.
+    box = np.ones(box_px * per_px + 1) / (box_px * per_px)
     box[[0, -1]] /= 2.0
     sigma = blur_px * per_px
     if sigma < 0.3:
@@ -133,11 +135,11 @@ def _kernel(per_px: int, blur_px: float) -> NDArray[np.float32]:
 
 
 @lru_cache(maxsize=256)
-def _draw(radius_steps: int, blur_steps: int, shades: Shades, reach: int) -> Template:
+def _draw(radius_steps: int, blur_steps: int, box_px: int, shades: Shades, reach: int) -> Template:
     """Draw the shapes of a ball of a rounded radius and blur."""
     radius_px, blur_px = radius_steps * RADIUS_STEP_PX, blur_steps * BLUR_STEP_PX
     per_px = 8 if radius_px < 6.0 else 4
-    kernel = _kernel(per_px, blur_px)
+    kernel = _kernel(per_px, blur_px, box_px)
     weights = np.array(shades.weights)
     border = len(kernel) // 2 + 1
     drawn = _sharp(per_px, radius_px, border, np.array(shades.lamp), weights)
@@ -192,7 +194,7 @@ def read(
     for k in range(len(places)):
         top, left = reach * per_px - v_steps - places[k, 1], reach * per_px - u_steps - places[k, 0]
         for i in range(pixels.shape[1]):
-            r, c = top + int(pixels[1, i]) * per_px, left + int(pixels[0, i]) * per_px
+            r, c = top + int(pixels[1, i] * per_px), left + int(pixels[0, i] * per_px)
             for p in range(shapes):
                 value[p, i] += fine[r, c, p]
                 by_u[p, i] += fine[r, c - 1, p] - fine[r, c + 1, p]
