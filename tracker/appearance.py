@@ -1,4 +1,4 @@
-"""How balls look in this room and these cameras, learned while tracking: the light and each camera's blur."""
+"""How balls look to one camera, learned while tracking: the light that it sees and how it answers to it."""
 
 from __future__ import annotations
 
@@ -16,17 +16,7 @@ from tracker.template import FLAT, Shades
 from tracker.types import Array, Image
 
 BEARING_STEP_RAD = 0.07  # rays closer than this share a ball's shading
-PUBLISH_AT = (
-    6,
-    12,
-    18,
-    24,
-    30,
-    36,
-    72,
-    144,
-    288,
-)  # balls learned when templates follow the light, then every last of these
+PUBLISH_AT = (3, 6, 9, 12, 15, 18, 36, 72, 144)  # balls learned when templates follow the light, then every last
 BLUR_STEP_PX, FIRST_STEP_PX = 0.03, 0.15
 DETAIL_SHARE = 0.05  # of the newest ball in what is known of the camera's colour detail
 MISFIT_MAX = 2.0  # an image that fits no ball teaches nothing
@@ -34,47 +24,40 @@ MISFIT_MAX = 2.0  # an image that fits no ball teaches nothing
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Appearance:
-    """What is known so far.
+    """What is known of one camera so far.
 
+    response: the camera's.
     light: learned.  shown: the light that templates are drawn by; it follows `light` in few, growing steps.
-    responses: of each camera.
     """
 
-    responses: tuple[Response, ...]
+    response: Response = field(default_factory=Response)
     light: Light = field(default_factory=Light)
     shown: Light = field(default_factory=Light)
 
     def shades(self, camera: Camera, bearing_inC: Array) -> Shades:
-        """Return how a ball is shaded that a camera sees along a bearing (3,)."""
+        """Return how a ball is shaded that the camera sees along a bearing (3,)."""
         if not self.shown.count:
             return FLAT
         x, y = (round(float(bearing_inC[i] / bearing_inC[2]) / BEARING_STEP_RAD) for i in (0, 1))
         return _shades(self.shown, camera, x, y)
 
-    @property
-    def gamma(self) -> float:
-        """Return the gamma that is taken for the cameras'."""
-        return self.responses[0].gamma
-
     def with_gamma(self, gamma: float) -> Appearance:
         """Return it under another gamma, its light ready to be learned anew."""
-        if gamma == self.gamma:
+        if gamma == self.response.gamma:
             return self
-        responses = tuple(replace(response, gamma=gamma) for response in self.responses)
-        return replace(self, responses=responses, light=self.light.faded())
+        return replace(self, response=replace(self.response, gamma=gamma), light=self.light.faded())
 
-    def expected_like(self, ball: Expected, camera: Camera, index: int, uv_px: Array) -> Expected:
+    def expected_like(self, ball: Expected, camera: Camera, uv_px: Array) -> Expected:
         """Return what would be expected of a ball, seen at uv_px (2,), if it looked as is known here."""
         shades = self.shades(camera, camera.bearings(uv_px[None])[0])
         place = float(uv_px[0]), float(uv_px[1])
-        return replace(ball, uv_px=place, shades=shades, response=self.responses[index])
+        return replace(ball, uv_px=place, shades=shades, response=self.response)
 
-    def learned(self, image: Image, camera: Camera, index: int, ball: Expected, found: Centre) -> Appearance:
+    def learned(self, image: Image, camera: Camera, ball: Expected, found: Centre) -> Appearance:
         """Return what is known after one more ball.
 
         Args:
             image: the camera's, BGR.
-            index: the camera's place in the rig.
             ball, found: what was expected of the ball and what its fit gave.
         """
         if found.misfit > MISFIT_MAX:
@@ -82,7 +65,7 @@ class Appearance:
         extent = extent_of(ball)
         patch = cut(image, extent, ball.response)
         centre = float(found.uv_px[0]) - extent.u, float(found.uv_px[1]) - extent.v
-        response = sharper(patch, ball, centre, max(BLUR_STEP_PX, FIRST_STEP_PX / (1.0 + self.light.count / 6.0)))
+        response = sharper(patch, ball, centre, max(BLUR_STEP_PX, FIRST_STEP_PX / (1.0 + self.light.count / 3.0)))
         detail = response.detail + DETAIL_SHARE * (detail_of(image, extent) - response.detail)
         response = replace(response, detail=detail)
         R_RtoW = ray_frame(camera.bearings(found.uv_px[None])[0], camera.R_CtoW)
@@ -90,9 +73,7 @@ class Appearance:
         light = self.light if equations is None else self.light.learned(*equations, R_RtoW)
         due = light.count in PUBLISH_AT or light.count % PUBLISH_AT[-1] == 0
         shown = light if due and light.trusted else self.shown
-        return replace(
-            self, responses=(*self.responses[:index], response, *self.responses[index + 1 :]), light=light, shown=shown
-        )
+        return Appearance(response, light, shown)
 
 
 @lru_cache(maxsize=4096)

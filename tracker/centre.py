@@ -23,7 +23,7 @@ from tracker.template import places_along, read, template_for
 from tracker.types import Array, Image, Reason, frozen_array
 
 PLANE = 3  # terms of the background
-TUKEY = 4.0
+TUKEY = 4.685  # of the robust sigma: 95 % efficient where all is well (Huber, Ronchetti, "Robust Statistics", 2009)
 LEAST_WEIGHT = 1e-3
 ITERATIONS = 5
 ROUGH_PX = 0.5

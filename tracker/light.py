@@ -17,7 +17,7 @@ from tracker.types import Array
 
 FORGETTING = 0.98  # a ball: the light of about the last fifty counts
 FADED = 0.2  # what is left of what was learned under another gamma
-ENOUGH = 6  # balls until the light is trusted
+ENOUGH = 3  # balls until the light is trusted
 RIDGE = np.array([0.0, 0.05, 0.05, 0.05, 0.002, 0.002, 0.002])  # a lamp explains what it can, one-sided light the rest
 LAMP_STEPS = 32  # directions and weights are rounded to 1 / LAMP_STEPS, so that templates can be kept
 _UP = np.array([0.0, 0.0, 1.0])

@@ -42,19 +42,21 @@ class Look:
     rejections: tuple[Rejected, ...]
 
 
-def look_near(frames: Sequence[Frame], rig: Rig, state: State, appearance: Appearance, floor_px: float) -> Look:
+def look_near(
+    frames: Sequence[Frame], rig: Rig, state: State, appearances: Sequence[Appearance], floor_px: float
+) -> Look:
     """Find each ball in each image, in the region where a state, with its covariance, expects it.
 
     Args:
         frames: of different cameras, at about one time.
         state: carried to about that time.
-        appearance: how balls look here.
+        appearances: how balls look to each camera of the rig.
         floor_px: one sigma of what the fit cannot know, added to its covariance [px].
     """
     fitted: list[Fitted] = []
     rejections: list[Rejected] = []
     for frame in frames:
-        for b, what in _expectations(frame, rig, state, appearance):
+        for b, what in _expectations(frame, rig, state, appearances[frame.camera]):
             if isinstance(what, Rejected):
                 rejections.append(what)
                 continue
@@ -89,7 +91,7 @@ def _expectations(
         u, v = blob.uv_px.tolist()
         shades = appearance.shades(camera, camera.bearings(blob.uv_px[None])[0])
         speed_px_s = float(speeds_px_s[b, 0]), float(speeds_px_s[b, 1])
-        yield b, Expected((u, v), radius_px, speed_px_s, shades, appearance.responses[frame.camera])
+        yield b, Expected((u, v), radius_px, speed_px_s, shades, appearance.response)
 
 
 def _nearest_blob(frame: Frame, rig: Rig, b: int, uv_px: Array, S: Array, radius_px: float) -> Blob | Rejected:

@@ -41,7 +41,7 @@ from tracker.types import (
 )
 
 RESETS = 256
-LEARN_ALL = 144  # balls; then
+LEARN_ALL = 72  # balls; then
 LEARN_EVERY = 4  # rounds one ball
 
 Round = tuple[Frame, ...]
@@ -68,7 +68,7 @@ class Tracker:
         self._stopwatch = stopwatch
         self._intake = Intake(rig)
         self._rounds = Rounds(len(rig.cameras), tuning.sync_window_ns)
-        self._rivals = first_rivals(len(rig.cameras))
+        self._rivals = [first_rivals() for _ in rig.cameras]
         self._turn = 0
         self._history = History()
         self._whole: dict[int, tuple[Frame, list[list[Blob]]]] = {}
@@ -146,7 +146,9 @@ class Tracker:
 
         start: the state is a first guess, which every ball must bear out.
         """
-        look = look_near(frames, self._rig, ahead, self._rivals.best, self._tuning.pixel_noise_floor_px)
+        look = look_near(
+            frames, self._rig, ahead, [rivals.best for rivals in self._rivals], self._tuning.pixel_noise_floor_px
+        )
         harvest.rejections += look.rejections
         result = self._update(ahead, tuple(one.sighting for one in look.fitted))
         if isinstance(result, Update) and start and not self._all_seen_twice(result):
@@ -162,12 +164,12 @@ class Tracker:
     def _learn(self, fitted: list[Fitted]) -> None:
         """Learn how balls look: from every one at first, then from one in turn every few rounds."""
         self._turn += 1
-        if self._rivals.settled and self._rivals.best.light.count >= LEARN_ALL:
+        if all(rivals.settled and rivals.best.light.count >= LEARN_ALL for rivals in self._rivals):
             fitted = [fitted[self._turn // LEARN_EVERY % len(fitted)]] if self._turn % LEARN_EVERY == 0 else []
         for one in fitted:
             index = one.frame.camera
             camera, image = self._rig.cameras[index], one.frame.image
-            self._rivals = self._rivals.learned(image, camera, index, one.expected, one.centre)
+            self._rivals[index] = self._rivals[index].learned(image, camera, one.expected, one.centre)
 
     def _update(self, ahead: State, sightings: tuple[BallSighting, ...]) -> Update | Rejected:
         """Update a predicted state, unless it comes to lean as no vehicle does."""
@@ -191,7 +193,7 @@ class Tracker:
         found = self._see(tuple(frame for frame, _ in fresh.values()), start, harvest, start=True)
         if found is None:
             return None
-        for _ in range(self._rivals.lessons_due):
+        for _ in range(max(rivals.lessons_due for rivals in self._rivals)):
             found = self._see(tuple(frame for frame, _ in fresh.values()), start, _Harvest(), start=True) or found
         before = self._history.newest
         if before is not None and self._jumped(before, found.state):

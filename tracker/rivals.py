@@ -1,4 +1,4 @@
-"""Which gamma the cameras have: several are tried side by side, each with the light that it makes one see.
+"""Which gamma a camera has: several are tried side by side, each with the light that it makes one see.
 
 Light learned under a wrong gamma hides the error, so a gamma cannot be learned in small steps as blur is: each rival
 learns its own light and blur from the same balls, and the one whose images fit best is believed. Then the rivals come
@@ -20,14 +20,14 @@ from tracker.types import Image
 GAMMAS = (1.0, 1.6, 2.2)
 LEAST_GAMMA, MOST_GAMMA = 1.0, 2.8
 LAST_STEP = 0.1
-ROUND_BALLS = 72  # balls that a set of rivals learns from before the best is chosen
-FIRST_LESSONS, FIRST_BALLS = 4, 24
-FORGETTING = 0.97  # a ball: what the light was when it was still being learned counts little
+ROUND_BALLS = 36  # balls that a set of rivals learns from before the best is chosen
+FIRST_LESSONS, FIRST_BALLS = 4, 12
+FORGETTING = 0.94  # a ball: what the light was when it was still being learned counts little
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rivals:
-    """Appearances under different gammas.
+    """One camera's appearances under different gammas.
 
     appearances: one a gamma.  misfits: of each, recent mean of the logarithm.  count: balls learned since they were
     set up.  step: between gammas; 0 when the search is over and one is left.
@@ -53,19 +53,19 @@ class Rivals:
         """Say whether the search is over."""
         return len(self.appearances) == 1
 
-    def learned(self, image: Image, camera: Camera, index: int, ball: Expected, found: Centre) -> Rivals:
+    def learned(self, image: Image, camera: Camera, ball: Expected, found: Centre) -> Rivals:
         """Return the rivals after one more ball; arguments as for `Appearance.learned`."""
         if found.misfit > MISFIT_MAX:
             return self
         if self.settled:
-            return replace(self, appearances=(self.appearances[0].learned(image, camera, index, ball, found),))
+            return replace(self, appearances=(self.appearances[0].learned(image, camera, ball, found),))
         appearances, misfits = [], []
         for rival, misfit in zip(self.appearances, self.misfits, strict=True):
-            own = rival.expected_like(ball, camera, index, found.uv_px)
+            own = rival.expected_like(ball, camera, found.uv_px)
             fit = fit_centre(image, own)
             if not isinstance(fit, Centre):
                 return self
-            appearances.append(rival.learned(image, camera, index, own, fit))
+            appearances.append(rival.learned(image, camera, own, fit))
             share = max(1.0 - FORGETTING, 1.0 / (self.count + 1))
             misfits.append(misfit + share * (float(np.log(fit.misfit)) - misfit))
         after = Rivals(tuple(appearances), tuple(misfits), self.count + 1, self.step)
@@ -76,12 +76,12 @@ class Rivals:
         best, step = self.best, self.step / 2.0
         if step < LAST_STEP:
             return Rivals((best,), (0.0,), 0, 0.0)
-        gammas = [best.gamma + k * step for k in (-1, 0, 1)]
+        gammas = [best.response.gamma + k * step for k in (-1, 0, 1)]
         kept = [best.with_gamma(gamma) for gamma in gammas if LEAST_GAMMA <= gamma <= MOST_GAMMA]
         return Rivals(tuple(kept), (0.0,) * len(kept), 0, step)
 
 
-def first_rivals(camera_count: int) -> Rivals:
+def first_rivals() -> Rivals:
     """Return the rivals before anything was seen."""
-    appearances = tuple(Appearance((Response(gamma=gamma),) * camera_count) for gamma in GAMMAS)
+    appearances = tuple(Appearance(Response(gamma=gamma)) for gamma in GAMMAS)
     return Rivals(appearances, (0.0,) * len(GAMMAS), 0, GAMMAS[1] - GAMMAS[0])

@@ -7,15 +7,17 @@ import pytest
 
 from tests.tracker.drawing import developed, draw_ball, empty_canvas
 from tests.tracker.paper_rig import paper_rig
+from tracker.appearance import Appearance
 from tracker.centre import Centre, fit_centre
 from tracker.patch import Expected, Response
 from tracker.template import FLAT
 from tracker.types import Array, Image, Reason
 
 RIG = paper_rig()
+CAMERA = RIG.cameras[0]
 BALL = RIG.marker.balls[1]
 RADIUS_PX = 2.8  # the paper's ball in the middle of the room
-SHARP = Response(0.2, 0.2)
+SHARP = Response(0.2, 0.2, detail=1.0)
 
 
 def expected(uv_px: Array, radius_px: float = RADIUS_PX) -> Expected:
@@ -36,15 +38,42 @@ def fitted(image: Image, guess_px: Array, radius_px: float = RADIUS_PX) -> Centr
     return found
 
 
+def accustomed(radius_px: float) -> Appearance:
+    """Return what a camera has learned from forty balls."""
+    rng = np.random.default_rng(2)
+    known = Appearance(SHARP)
+    for _ in range(40):
+        uv_px = rng.uniform((200, 200), (400, 300))
+        image = picture(uv_px, radius_px, noise=(1.0, rng))
+        what = known.expected_like(expected(uv_px, radius_px), CAMERA, uv_px)
+        found = fit_centre(image, what)
+        assert isinstance(found, Centre)
+        known = known.learned(image, CAMERA, what, found)
+    return known
+
+
 @pytest.mark.parametrize("radius_px", [2.2, 2.8, 4.0, 6.5])
-def test_a_ball_is_found_to_three_hundredths_of_its_radius_wherever_it_lies_between_pixels(
-    radius_px: float,
-) -> None:
+def test_a_ball_is_found_to_a_thirtieth_of_a_pixel_once_the_light_is_known(radius_px: float) -> None:
+    """Root mean square on each axis, at noise of one grey level, however rough the start."""
+    rng, known = np.random.default_rng(3), accustomed(radius_px)
+    errors = []
+    for _ in range(12):
+        uv_px = rng.uniform((200, 200), (400, 300))
+        start_px = uv_px + rng.uniform(-0.7, 0.7, 2)
+        what = known.expected_like(expected(uv_px, radius_px), CAMERA, start_px)
+        found = fit_centre(picture(uv_px, radius_px, noise=(1.0, rng)), what)
+        assert isinstance(found, Centre)
+        errors.append(found.uv_px - uv_px)
+    assert np.sqrt(np.mean(np.square(errors), axis=0)).max() < 1.0 / 30.0
+
+
+@pytest.mark.parametrize("radius_px", [2.2, 2.8, 4.0, 6.5])
+def test_a_ball_in_light_not_known_is_found_to_a_twentieth_of_its_radius(radius_px: float) -> None:
     rng = np.random.default_rng(3)
     for _ in range(6):
         uv_px = rng.uniform((200, 200), (400, 300))
         found = fitted(picture(uv_px, radius_px), uv_px + rng.uniform(-0.7, 0.7, 2), radius_px)
-        assert np.hypot(*(found.uv_px - uv_px)) < 0.03 * radius_px
+        assert np.hypot(*(found.uv_px - uv_px)) < 0.05 * radius_px
 
 
 def test_the_mean_error_over_many_places_is_small_though_the_light_is_not_known() -> None:
@@ -90,6 +119,6 @@ def test_a_ball_cut_by_the_border_is_rejected(uv_px: tuple[float, float]) -> Non
 def test_an_image_that_nobody_may_write_to_can_be_fitted() -> None:
     uv_px = np.array([300.4, 200.2])
     image = picture(uv_px)
+    writeable = fitted(image, uv_px)
     image.flags.writeable = False
-    found = fitted(image, uv_px)
-    assert np.hypot(*(found.uv_px - uv_px)) < 0.05
+    assert np.array_equal(fitted(image, uv_px).uv_px, writeable.uv_px)

@@ -19,7 +19,7 @@ from tracker.types import BallSighting, Frame, Reason, Rejected
 RIG = paper_rig()
 FLYING = state(0, (0.2, -0.1, 0.1), (12.0, -8.0, 130.0), (0.5, 0.5, 0.2), (0.3, 0.2, 1.0))
 FLOOR_PX = 0.05
-SHARP = Appearance((Response(0.25, 0.25), Response(0.25, 0.25)))
+SHARP = [Appearance(Response(0.25, 0.25, detail=1.0))] * 2
 
 
 def look(image: Frame, expected: State) -> tuple[list[BallSighting], list[Rejected]]:
