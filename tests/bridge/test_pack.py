@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import common
 
 from bridge.ned import NedFrame, pose_jacobian, rotation_from_room
 from bridge.pack import MESSAGES, Encoder, Identity, Packer, heartbeat
@@ -211,6 +212,20 @@ def test_the_heartbeat_is_that_of_an_onboard_controller() -> None:
     assert frame.fields == {
         "custom_mode": 0, "type": 18, "autopilot": 8, "base_mode": 0, "system_status": 4, "mavlink_version": 3,
     }  # fmt: skip
+
+
+@pytest.mark.parametrize("p_BinW", [(0.0, 0.0, 0.0), (1.0, -2.0, 3.0)])
+@pytest.mark.parametrize("cut", [1.0, 0.0])
+@pytest.mark.parametrize("sequence", [0, 255])
+def test_frames_are_byte_for_byte_those_that_pymavlink_packs(p_BinW: Floats, cut: float, sequence: int) -> None:
+    covariance = cut * random_covariance(np.random.default_rng(3), 12)
+    messages = Packer(30.0).messages(estimate(p_BinW=p_BinW, covariance=covariance), MESSAGES)
+    theirs = common.MAVLink(None, srcSystem=7, srcComponent=197)
+    theirs.seq = sequence
+    classes = {each.msgname: each for each in common.mavlink_map.values()}
+    for message in (*messages.values(), heartbeat(0)):
+        expected = bytes(classes[message.name](**message.fields).pack(theirs))
+        assert Encoder(Identity(7))(message, sequence) == expected
 
 
 def test_a_frame_says_who_speaks_and_in_which_order() -> None:
