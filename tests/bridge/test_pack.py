@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common
 
-from bridge.ned import NedFrame, pose_jacobian, rotation_from_room
+from bridge.ned import NedFrame, pose_jacobian, rotation_from_room, turned_triangle
 from bridge.pack import MESSAGES, Encoder, Identity, Packer, heartbeat
 from tests.bridge.estimates import estimate, random_covariance
 from tests.bridge.mavlink_by_hand import ByHand, parse
@@ -166,6 +166,14 @@ def test_the_pose_jacobian_is_that_of_finite_differences(
     differences[3:] = np.mod(differences[3:] + math.pi, 2 * math.pi) - math.pi
     cos_squared = math.cos(pitch) ** 2
     np.testing.assert_allclose(differences / (2 * step), pose_jacobian(R_WtoN, roll, pitch), atol=1e-6 / cos_squared)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_a_covariance_is_turned_as_matrices_turn_it(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    J, covariance = rng.normal(size=(6, 6)), random_covariance(rng, 12)
+    expected = (J @ covariance[:6, :6] @ J.T)[np.triu_indices(6)]
+    np.testing.assert_allclose(turned_triangle(J, covariance), expected, rtol=1e-9, atol=1e-9)
 
 
 @settings(deadline=None, max_examples=50)
