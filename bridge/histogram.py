@@ -4,30 +4,35 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from bridge.summary import NO_SAMPLES, Percentiles
 
 LEAST_NS = 1_000
 BINS_PER_DECADE = 200  # neighbouring bins are 1.16 % apart
 DECADES = 8  # 1 us to 100 s
+BINS = BINS_PER_DECADE * DECADES + 1
+FOLD_AT = 512  # samples that wait to be counted together, so that one costs the loop next to nothing
 
 
 class Histogram:
     """Count durations in logarithmic bins; the largest is kept exactly."""
 
     def __init__(self) -> None:
-        self._bins = [0] * (BINS_PER_DECADE * DECADES + 1)
+        self._bins = np.zeros(BINS, np.int64)
+        self._waiting: list[int] = []
         self._count = 0
         self._max_ns = 0
 
     def add(self, duration_ns: int) -> None:
         """Count one duration [ns]; those outside 1 us to 100 s count in the first or last bin."""
-        place = round(BINS_PER_DECADE * math.log10(max(duration_ns, LEAST_NS) / LEAST_NS))
-        self._bins[min(place, len(self._bins) - 1)] += 1
-        self._count += 1
-        self._max_ns = max(self._max_ns, duration_ns)
+        self._waiting.append(duration_ns)
+        if len(self._waiting) >= FOLD_AT:
+            self._fold()
 
     def percentiles(self) -> Percentiles:
         """Return the spread [ms], each percentile the middle of its bin and none beyond the largest sample."""
+        self._fold()
         if self._count == 0:
             return NO_SAMPLES
         p50, p95, p99 = (self._quantile_ms(share) for share in (0.50, 0.95, 0.99))
@@ -36,9 +41,16 @@ class Histogram:
     def _quantile_ms(self, share: float) -> float:
         """Return the duration that `share` of the samples do not exceed [ms]."""
         needed = math.ceil(share * self._count)
-        seen = 0
-        for place, count in enumerate(self._bins):
-            seen += count
-            if seen >= needed:
-                return min(LEAST_NS * 10 ** (place / BINS_PER_DECADE), self._max_ns) / 1e6
-        return self._max_ns / 1e6
+        place = int(np.searchsorted(np.cumsum(self._bins), needed))
+        return float(min(LEAST_NS * 10 ** (place / BINS_PER_DECADE), self._max_ns) / 1e6)
+
+    def _fold(self) -> None:
+        """Count what waits."""
+        if not self._waiting:
+            return
+        self._count += len(self._waiting)
+        self._max_ns = max(self._max_ns, *self._waiting)
+        ratios = np.maximum(self._waiting, LEAST_NS) / LEAST_NS
+        places = np.rint(BINS_PER_DECADE * np.log10(ratios)).astype(np.int64)
+        self._bins += np.bincount(np.minimum(places, BINS - 1), minlength=BINS)
+        self._waiting.clear()

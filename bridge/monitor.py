@@ -33,6 +33,7 @@ class Monitor:
         self._first_ns: int | None = None
         self._worst_gap_ns: int | None = None
         self._newest: Estimate | None = None
+        self._ready_ns = 0  # stopwatch at the newest estimate's end
         self.state = TrackState.SEARCHING
         self._lost = 0
         self._resets = 0
@@ -41,8 +42,8 @@ class Monitor:
         """Count one turn: the event (None at the end of all), what the tracker made of it, what left on the links."""
         if isinstance(event, Frame):
             self._frames[event.camera] += 1
-        self._rejected.update(rejected.reason.value for rejected in step.rejections)
         if step.rejections:
+            self._rejected.update([rejected.reason.value for rejected in step.rejections])
             self.last_rejection = f"{step.rejections[-1].reason.value}, {step.rejections[-1].detail}"
         self._lost += step.state is TrackState.LOST and self.state is not TrackState.LOST
         self.state = step.state
@@ -63,18 +64,21 @@ class Monitor:
         self._newest = estimate
         self._count += 1
         for name, duration_ns in estimate.stages_ns.items():
-            self._stages.setdefault(name, Histogram()).add(duration_ns)
+            self._stage(name).add(duration_ns)
+        self._ready_ns = estimate.available_ns + sum(estimate.stages_ns.values())
         self._recent.append(estimate.t_ns)
         while estimate.t_ns - self._recent[0] > RATE_WINDOW_NS:
             self._recent.popleft()
 
     def _take_sending(self, record: Sent) -> None:
         """Time the last stage: from the estimate's end to the kernel's taking its message."""
-        newest = self._newest
-        if newest is None or record.t_ns != newest.t_ns:
-            return
-        ready_ns = newest.available_ns + sum(newest.stages_ns.values())
-        self._stages.setdefault(SEND, Histogram()).add(record.sent_ns - ready_ns)
+        if self._newest is not None and record.t_ns == self._newest.t_ns:
+            self._stage(SEND).add(record.sent_ns - self._ready_ns)
+
+    def _stage(self, name: str) -> Histogram:
+        if name not in self._stages:
+            self._stages[name] = Histogram()
+        return self._stages[name]
 
     def reading(self, links: tuple[LinkState, ...], log: str) -> Reading:
         """Return what the status line shows now."""

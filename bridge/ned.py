@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from tracker import so3
+from tracker.compiled import compiled
 from tracker.errors import OperatorError
 from tracker.types import Array, Estimate, frozen_array
 
 # F is B turned by half a turn about x; as a diagonal it is its own inverse and flips columns by broadcasting.
 _FLIP = frozen_array([1.0, -1.0, -1.0])
-_UPPER_TRIANGLE = np.flatnonzero(np.triu(np.ones((6, 6), dtype=bool)))
 # Euler angles end at pitch +/-90 deg. Beyond 89.4 deg their covariance stays at its value there: already "unknown"
 # to any filter, and still positive definite in 32-bit floats, which resolve 1 - rho^2 = cos(pitch)^2 no further.
 _MIN_COS_PITCH = 0.01
@@ -66,7 +66,7 @@ class NedFrame:
         R_FtoN = self.R_WtoN @ estimate.R_BtoW * _FLIP
         roll, pitch, yaw = so3.to_euler(R_FtoN)
         J = pose_jacobian(self.R_WtoN, roll, pitch)
-        covariance = J @ estimate.covariance[:6, :6] @ J.T
+        triangle = turned_triangle(J, estimate.covariance)
         rounded = _POSE_FLOAT32.unpack(
             _POSE_FLOAT32.pack(
                 *(self.R_WtoN @ estimate.p_BinW).tolist(),
@@ -74,7 +74,7 @@ class NedFrame:
                 pitch,
                 yaw,
                 *so3.quaternion(R_FtoN).tolist(),
-                *covariance.take(_UPPER_TRIANGLE).tolist(),
+                *triangle.tolist(),
             )
         )
         return NedPose(list(rounded[:3]), list(rounded[3:6]), list(rounded[6:10]), list(rounded[10:]))
@@ -94,6 +94,24 @@ def rotation_from_room(room_yaw: float) -> Array:
     """
     c, s = math.cos(room_yaw), math.sin(room_yaw)
     return frozen_array([[c, s, 0.0], [s, -c, 0.0], [0.0, 0.0, -1.0]])
+
+
+@compiled("f8[::1](Array(f8, 2, 'A', readonly=True), Array(f8, 2, 'A', readonly=True))")
+def turned_triangle(J: Array, covariance: Array) -> Array:
+    """Return the upper triangle (21,), row by row, of J C J' for J (6, 6) and the first six of C's rows and columns."""
+    half = np.zeros((6, 6))
+    for i in range(6):
+        for k in range(6):
+            for j in range(6):
+                half[i, j] += J[i, k] * covariance[k, j]
+    triangle = np.zeros(21)
+    place = 0
+    for i in range(6):
+        for j in range(i, 6):
+            for k in range(6):
+                triangle[place] += half[i, k] * J[j, k]
+            place += 1
+    return triangle
 
 
 def pose_jacobian(R_WtoN: Array, roll: float, pitch: float) -> Array:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import struct
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -19,6 +20,7 @@ from tracker.types import Estimate
 Fields = dict[str, FieldValue]
 HEARTBEAT = "HEARTBEAT"
 
+_HEAD = struct.Struct("<BBBBBBHB")  # of a MAVLink 2 frame, behind the marker
 _MARKER = re.compile(rb"[\xfd\xfe]")
 _CLASSES = {dialect_class.msgname: dialect_class for dialect_class in common.mavlink_map.values()}
 _HEARTBEAT_FIELDS = MappingProxyType(
@@ -147,15 +149,35 @@ def heartbeat(t_ns: int) -> Message:
 
 
 class Encoder:
-    """Frame messages for one link. Not to be shared between threads: pymavlink keeps the frame's state in it."""
+    """Frame messages for one link, by the dialect's own tables.
+
+    pymavlink's `pack` makes the same bytes, as a test shows, and takes four times as long.
+    """
 
     def __init__(self, identity: Identity) -> None:
-        self._mav = common.MAVLink(None, srcSystem=identity.system_id, srcComponent=identity.component_id)
+        self._identity = identity
 
     def __call__(self, message: Message, sequence: int) -> bytes:
-        """Return the whole MAVLink 2 frame with the sequence number, 0..255."""
-        self._mav.seq = sequence
-        return bytes(_CLASSES[message.name](**message.fields).pack(self._mav))
+        """Return the whole MAVLink 2 frame with the sequence number, 0..255.
+
+        Source: the MAVLink serialisation guide: fields by size, zeros at the end of the payload left out but for its
+        first byte, checksum over all but the marker, and over the message's own extra byte.
+        """
+        dialect_class = _CLASSES[message.name]
+        values: list[object] = []
+        for name in dialect_class.ordered_fieldnames:
+            value = message.fields[name]
+            if isinstance(value, list):
+                values += value
+            else:
+                values.append(value.encode() if isinstance(value, str) else value)
+        packed: bytes = dialect_class.unpacker.pack(*values)
+        payload = packed.rstrip(b"\0") or packed[:1]
+        number, identity = dialect_class.id, self._identity
+        head = (len(payload), 0, 0, sequence, identity.system_id, identity.component_id, number & 0xFFFF, number >> 16)
+        body = _HEAD.pack(*head) + payload
+        checksum: int = common.x25crc(body + bytes((dialect_class.crc_extra,))).crc
+        return b"\xfd" + body + checksum.to_bytes(2, "little")
 
 
 class Reader:

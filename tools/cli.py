@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.metadata
+import os
 import signal
 import sys
 import tempfile
@@ -21,6 +22,7 @@ EXIT_PATH_NOT_HELD = 1
 EXIT_OPERATOR = 2
 EXIT_INTERRUPTED = 130
 STDOUT = Path("-")
+ONE_THREAD_EACH = ("OPENCV_FOR_THREADS_NUM", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 bench = typer.Typer(help="Measure accuracy, speed and memory: the figures in docs/benchmarks.md.")
@@ -38,6 +40,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def run_command_line(arguments: Sequence[str]) -> int:
     """Run one command and return its exit code; what the operator can mend is one line on stderr."""
+    _keep_to_one_core()
     _interrupt_once()
     try:
         return int(app(list(arguments), prog_name="posebridge", standalone_mode=False) or 0)
@@ -47,6 +50,15 @@ def run_command_line(arguments: Sequence[str]) -> int:
         return _refuse(str(error))
     except KeyboardInterrupt:  # before the command began; within it, typer itself returns 130
         return EXIT_INTERRUPTED
+
+
+def _keep_to_one_core() -> None:
+    """Stop OpenCV and BLAS from starting a thread for each core: images here are small, the other cores others' work.
+
+    It is told by the environment, before they are loaded; what the operator has set there stays.
+    """
+    for name in ONE_THREAD_EACH:
+        os.environ.setdefault(name, "1")
 
 
 def _refuse(message: str) -> int:
@@ -196,8 +208,10 @@ def speed(
     """Time tracking and acquisition with the frames in memory."""
     from bridge.settings import load_settings
     from tools.bench.commands import bench_speed
+    from tools.bench.speed import CpuClocks
 
-    bench_speed(pairs, load_settings(config), _clocks(), json)
+    cpu = CpuClocks(process=time.process_time_ns, thread=time.thread_time_ns)
+    bench_speed(pairs, load_settings(config), _clocks(), cpu, json)
 
 
 @bench.command()

@@ -5,16 +5,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 
-from tracker.rig import Ball, Colour
+from tracker.palette import Palette, palette_of
+from tracker.rig import Ball
+from tracker.spots import find_spots
 from tracker.types import Array, Image, frozen_array
-
-MIN_AREA_PX = 4
-FILL_MIN = 0.4  # share of its bounding box that a blob of a disc covers (pi/4 when whole)
-ASPECT_MAX = 2.2
-HUE_STEPS = 180  # OpenCV's 8-bit hue counts half degrees
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,35 +50,40 @@ def find_blobs(image: Image, region: Region | None, balls: tuple[Ball, ...], max
     Returns:
         For each ball its blobs in the whole image's pixels, largest first.
     """
-    part = image if region is None else image[region.top : region.bottom, region.left : region.right]
-    offset = np.zeros(2) if region is None else np.array([region.left, region.top], dtype=np.float64)
-    hsv: Image = np.asarray(cv2.cvtColor(part, cv2.COLOR_BGR2HSV), dtype=np.uint8)
-    return [_blobs_of(colour_mask(hsv, ball.colour), offset, max_area_px) for ball in balls]
+    if region is None:
+        height, width = image.shape[:2]
+        region = Region(0, 0, width, height)
+    blobs: list[list[Blob]] = [[] for _ in balls]
+    for ball, u, v, area in spots_in(image, region, palette_of(balls), max_area_px).tolist():
+        blobs[int(ball)].append(Blob(frozen_array((u, v)), area))
+    return blobs
 
 
-def colour_mask(hsv: Image, colour: Colour) -> Image:
-    """Return the mask (height, width), 255 where an HSV image has the colour; hues wrap round at 360 deg."""
-    low = round((colour.hue_deg - colour.hue_tolerance_deg) / 2.0)
-    high = round((colour.hue_deg + colour.hue_tolerance_deg) / 2.0)
-    saturation, value = round(colour.saturation_min * 255), round(colour.value_min * 255)
-    spans = [(max(low, 0), min(high, HUE_STEPS - 1))]
-    if low < 0:
-        spans.append((low + HUE_STEPS, HUE_STEPS - 1))
-    if high >= HUE_STEPS:
-        spans.append((0, high - HUE_STEPS))
-    masks = [cv2.inRange(hsv, (first, saturation, value), (last, 255, 255)) for first, last in spans]
-    return np.asarray(masks[0] if len(masks) == 1 else cv2.bitwise_or(masks[0], masks[1]), dtype=np.uint8)
+def spots_in(image: Image, region: Region, palette: Palette, max_area_px: float) -> Array:
+    """Find the blobs of each of a palette's colours, as plain numbers: some microseconds for a ball's surroundings.
 
-
-def _blobs_of(mask: Image, offset: Array, max_area_px: float) -> list[Blob]:
-    """Return the connected parts of a mask that may be a disc, largest first."""
-    count, _, stats, centroids = cv2.connectedComponentsWithStats(mask, connectivity=8)
-    blobs = []
-    for k in range(1, count):
-        _, _, width, height, area = (int(x) for x in stats[k])
-        if not MIN_AREA_PX <= area <= max_area_px:
-            continue
-        if area < FILL_MIN * width * height or max(width, height) > ASPECT_MAX * min(width, height) + 1:
-            continue
-        blobs.append(Blob(frozen_array(centroids[k] + offset), float(area)))
-    return sorted(blobs, key=lambda blob: -blob.area_px)
+    Args:
+        image: (height, width, 3) BGR.
+        region: where to look; it must lie within the image.
+        palette: the colours, from `tracker.palette.palette_of`.
+        max_area_px: larger blobs are no ball [px^2].
+    Returns:
+        (m, 4): index of the colour, centroid u and v in the whole image [px], area [px^2]; largest first.
+    Raises:
+        ValueError: the region reaches beyond the image.
+    """
+    left, top, right, bottom = region.left, region.top, region.right, region.bottom
+    height, width = image.shape[:2]
+    if not (0 <= left <= right <= width and 0 <= top <= bottom <= height):  # the compiled loop checks no index
+        raise ValueError(f"{region} reaches beyond an image of {width} x {height} px")
+    return find_spots(
+        np.ascontiguousarray(image),
+        left,
+        top,
+        right,
+        bottom,
+        palette.least_spread,
+        palette.lowest_spread,
+        palette.hues,
+        float(max_area_px),
+    )

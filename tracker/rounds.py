@@ -7,6 +7,7 @@ from collections import deque
 from tracker.types import Frame, Silence
 
 MEMORY = 3  # rounds by which a camera's companions are known
+NOBODY: frozenset[int] = frozenset()
 
 
 class Rounds:
@@ -24,6 +25,7 @@ class Rounds:
         self._window_ns = window_ns
         everyone = frozenset(range(camera_count))
         self._shared = [deque([everyone], maxlen=MEMORY) for _ in range(camera_count)]
+        self._companions = [everyone for _ in range(camera_count)]  # of `_shared`, all together
         self._open: dict[int, Frame] = {}
         self._closed_ns = -(2**63)
         self._closed: frozenset[int] = frozenset()
@@ -49,20 +51,20 @@ class Rounds:
 
     def _stragglers_of(self) -> frozenset[int]:
         """Return the cameras of the last closed round, if the open one is of the same instant."""
-        first_ns = min(frame.t_ns for frame in self._open.values())
-        return self._closed if abs(first_ns - self._closed_ns) <= self._window_ns else frozenset()
+        first_ns = min([frame.t_ns for frame in self._open.values()])
+        return self._closed if abs(first_ns - self._closed_ns) <= self._window_ns else NOBODY
 
     def _expected(self) -> frozenset[int]:
         """Return the cameras that the open round waits for."""
-        companions = frozenset().union(*(shared for camera in self._open for shared in self._shared[camera]))
-        return companions - self._stragglers_of()
+        return NOBODY.union(*[self._companions[camera] for camera in self._open]) - self._stragglers_of()
 
     def _close(self) -> tuple[Frame, ...]:
         """Close the open round and remember who came together."""
-        together = frozenset(self._open) | self._stragglers_of()
-        frames = tuple(self._open[camera] for camera in sorted(self._open))
+        together = self._stragglers_of().union(self._open)
+        frames = tuple([self._open[camera] for camera in sorted(self._open)])
         for camera in together:
             self._shared[camera].append(together)
-        self._closed, self._closed_ns = together, max(frame.t_ns for frame in frames)
+            self._companions[camera] = NOBODY.union(*self._shared[camera])
+        self._closed, self._closed_ns = together, max([frame.t_ns for frame in frames])
         self._open = {}
         return frames

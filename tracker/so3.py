@@ -40,20 +40,19 @@ def quaternion(R: Array) -> Array:
 
     Source: Shepperd, "Quaternion from rotation matrix", J. Guidance and Control 1 (1978): divide by the largest.
     """
-    trace = R[0, 0] + R[1, 1] + R[2, 2]
-    squares = np.array([trace, R[0, 0], R[1, 1], R[2, 2]])
-    k = int(np.argmax(squares))
-    if k == 0:
-        q = np.array([1.0 + trace, R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = R.tolist()  # nine plain numbers are quicker than NumPy's calls
+    trace = xx + yy + zz
+    largest = max(trace, xx, yy, zz)
+    if largest == trace:
+        w, x, y, z = 1.0 + trace, zy - yz, xz - zx, yx - xy
+    elif largest == xx:
+        w, x, y, z = zy - yz, 1.0 + 2.0 * xx - trace, yx + xy, zx + xz
+    elif largest == yy:
+        w, x, y, z = xz - zx, yx + xy, 1.0 + 2.0 * yy - trace, zy + yz
     else:
-        i, j, m = k - 1, k % 3, (k + 1) % 3
-        q = np.empty(4)
-        q[0] = R[m, j] - R[j, m]
-        q[1 + i] = 1.0 + 2.0 * R[i, i] - trace
-        q[1 + j] = R[j, i] + R[i, j]
-        q[1 + m] = R[m, i] + R[i, m]
-    q /= math.sqrt(float(q @ q))
-    return np.asarray(-q if q[0] < 0 else q)
+        w, x, y, z = yx - xy, zx + xz, zy + yz, 1.0 + 2.0 * zz - trace
+    scale = math.copysign(1.0 / math.sqrt(w * w + x * x + y * y + z * z), w)
+    return np.array([scale * w, scale * x, scale * y, scale * z])
 
 
 def right_jacobian(theta: Array) -> Array:

@@ -7,20 +7,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from io import BufferedWriter
 from pathlib import PurePath
-from typing import Any, Protocol
+from typing import Any
 
 from foxglove_schemas_protobuf.Log_pb2 import Log
-from mcap.writer import CompressionType, Writer
 
 from bridge.log import entry as values
 from bridge.log import scene, topics
+from bridge.log.container import Container
 from bridge.log.entry import Entry, encode
 from bridge.wire import Sent
 from tracker.camera import Camera
 from tracker.rig import Marker
 from tracker.types import Estimate, TrackState
 
-CHUNK_BYTES = 32 * 1024
 CALIBRATION_ATTACHMENT = "calibration.json"
 _MEDIA_TYPES = {
     ".toml": "application/toml",
@@ -28,16 +27,6 @@ _MEDIA_TYPES = {
     ".yaml": "application/yaml",
     ".txt": "text/plain",
 }
-
-
-class McapWriter(Protocol):
-    """What is used of mcap's writer after its beginning; the library leaves these two without types."""
-
-    def flush(self) -> None:
-        """End the chunk and hand everything to the kernel."""
-
-    def finish(self) -> None:
-        """Write index and footer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,15 +48,16 @@ class Cover:
 class Channel:
     """One topic of an open file."""
 
-    def __init__(self, writer: Writer, topic: topics.Topic) -> None:
-        schema_id = writer.register_schema(topic.schema_name, topic.schema_encoding, topic.schema)
-        self._id = writer.register_channel(topic.name, topic.message_encoding, schema_id)
-        self._writer = writer
+    def __init__(self, container: Container, topic: topics.Topic) -> None:
+        self._id = container.add_channel(
+            topic.name, topic.message_encoding, topic.schema_name, topic.schema_encoding, topic.schema
+        )
+        self._container = container
         self._sequence = 0
 
     def put(self, data: bytes, log_ns: int, publish_ns: int) -> None:
         """Append a message; MCAP knows no time before 0, so the file's own stamps stop there."""
-        self._writer.add_message(self._id, max(log_ns, 0), data, max(publish_ns, 0), self._sequence)
+        self._container.add_message(self._id, self._sequence, max(log_ns, 0), max(publish_ns, 0), data)
         self._sequence += 1
 
 
@@ -80,8 +70,7 @@ class LogWriter:
 
     def __init__(self, stream: BufferedWriter, cover: Cover) -> None:
         self._stream = stream
-        self._writer = Writer(stream, chunk_size=CHUNK_BYTES, compression=CompressionType.ZSTD)
-        self._ending: McapWriter = self._writer
+        self._container = Container(stream)
         self._cover = cover
         self._channels: dict[str, Channel] = {}
         self._state: TrackState | None = None
@@ -112,28 +101,27 @@ class LogWriter:
 
     def flush(self) -> None:
         """Hand everything written so far to the kernel: from here a kill of this process loses none of it."""
-        self._ending.flush()
+        self._container.flush()
 
     def finish(self, metadata: Mapping[str, str]) -> None:
         """Write the last metadata, the index and the footer, and close the stream."""
-        self._ending.flush()
-        self._writer.add_metadata("recorder", dict(metadata))
-        self._ending.finish()
+        self._container.flush()
+        self._container.add_metadata("recorder", metadata)
+        self._container.finish()
         self._stream.close()
 
     def _begin(self) -> None:
-        self._writer.start()
         for name, entries in self._cover.metadata.items():
-            self._writer.add_metadata(name, dict(entries))
+            self._container.add_metadata(name, entries)
         drawn = {CALIBRATION_ATTACHMENT: _calibration(self._cover.cameras, self._cover.marker)}
         for name, data in (drawn | dict(self._cover.attachments)).items():
             media_type = _MEDIA_TYPES.get(PurePath(name).suffix, "application/octet-stream")
-            self._writer.add_attachment(self._cover.made_ns, 0, name, media_type, data)
-        self._ending.flush()
+            self._container.add_attachment(self._cover.made_ns, name, media_type, data)
+        self._container.flush()
 
     def _write_scene(self, now_ns: int) -> None:
         for topic in topics.FIXED:
-            self._channels[topic.name] = Channel(self._writer, topic)
+            self._channels[topic.name] = Channel(self._container, topic)
         self._protobuf(topics.CAMERA_TF, scene.camera_transforms(self._cover.cameras), now_ns, now_ns)
         self._protobuf(topics.MARKER, scene.marker_scene(self._cover.marker), now_ns, now_ns)
         for camera in self._cover.cameras:
@@ -155,7 +143,7 @@ class LogWriter:
     def _write_sent(self, sent: Sent, now_ns: int) -> None:
         name = topics.SENT_PREFIX + sent.message
         if name not in self._channels:
-            self._channels[name] = Channel(self._writer, topics.sent_topic(sent.message, sent.fields))
+            self._channels[name] = Channel(self._container, topics.sent_topic(sent.message, sent.fields))
         self._channels[name].put(encode(values.sent_value(sent)), now_ns, sent.t_ns)
 
     def _write_changes(self, entry: Entry) -> None:
@@ -177,7 +165,7 @@ class LogWriter:
 
     def _channel(self, topic: topics.Topic) -> Channel:
         if topic.name not in self._channels:
-            self._channels[topic.name] = Channel(self._writer, topic)
+            self._channels[topic.name] = Channel(self._container, topic)
         return self._channels[topic.name]
 
 

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from pymavlink.dialects.v20 import common
 
-from bridge.ned import NedFrame, pose_jacobian, rotation_from_room
+from bridge.ned import NedFrame, pose_jacobian, rotation_from_room, turned_triangle
 from bridge.pack import MESSAGES, Encoder, Identity, Packer, heartbeat
 from tests.bridge.estimates import estimate, random_covariance
 from tests.bridge.mavlink_by_hand import ByHand, parse
@@ -167,6 +168,14 @@ def test_the_pose_jacobian_is_that_of_finite_differences(
     np.testing.assert_allclose(differences / (2 * step), pose_jacobian(R_WtoN, roll, pitch), atol=1e-6 / cos_squared)
 
 
+@given(st.integers(0, 2**32 - 1))
+def test_a_covariance_is_turned_as_matrices_turn_it(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    J, covariance = rng.normal(size=(6, 6)), random_covariance(rng, 12)
+    expected = (J @ covariance[:6, :6] @ J.T)[np.triu_indices(6)]
+    np.testing.assert_allclose(turned_triangle(J, covariance), expected, rtol=1e-9, atol=1e-9)
+
+
 @settings(deadline=None, max_examples=50)
 @given(
     p_BinW=st.lists(st.floats(-20, 20), min_size=3, max_size=3),
@@ -211,6 +220,20 @@ def test_the_heartbeat_is_that_of_an_onboard_controller() -> None:
     assert frame.fields == {
         "custom_mode": 0, "type": 18, "autopilot": 8, "base_mode": 0, "system_status": 4, "mavlink_version": 3,
     }  # fmt: skip
+
+
+@pytest.mark.parametrize("p_BinW", [(0.0, 0.0, 0.0), (1.0, -2.0, 3.0)])
+@pytest.mark.parametrize("cut", [1.0, 0.0])
+@pytest.mark.parametrize("sequence", [0, 255])
+def test_frames_are_byte_for_byte_those_that_pymavlink_packs(p_BinW: Floats, cut: float, sequence: int) -> None:
+    covariance = cut * random_covariance(np.random.default_rng(3), 12)
+    messages = Packer(30.0).messages(estimate(p_BinW=p_BinW, covariance=covariance), MESSAGES)
+    theirs = common.MAVLink(None, srcSystem=7, srcComponent=197)
+    theirs.seq = sequence
+    classes = {each.msgname: each for each in common.mavlink_map.values()}
+    for message in (*messages.values(), heartbeat(0)):
+        expected = bytes(classes[message.name](**message.fields).pack(theirs))
+        assert Encoder(Identity(7))(message, sequence) == expected
 
 
 def test_a_frame_says_who_speaks_and_in_which_order() -> None:

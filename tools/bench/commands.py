@@ -11,10 +11,10 @@ from rich.console import Console
 from rich.table import Table
 
 from bridge.settings import Settings
-from bridge.summary import Percentiles, to_text
+from bridge.summary import to_text
 from tools.bench.accuracy import Accuracy, measure_accuracy
 from tools.bench.memory import measure_memory
-from tools.bench.speed import measure_speed
+from tools.bench.speed import CpuClocks, Speed, measure_speed
 from tools.request import Clocks
 
 WIDTH = 140  # of the accuracy table; a narrower terminal wraps it
@@ -40,16 +40,22 @@ def bench_accuracy(recordings: list[Path], settings: Settings, clocks: Clocks, a
     Console(width=max(console.width, WIDTH)).print(table)
 
 
-def bench_speed(pairs: int, settings: Settings, clocks: Clocks, as_json: bool) -> None:
+def bench_speed(pairs: int, settings: Settings, clocks: Clocks, cpu: CpuClocks, as_json: bool) -> None:
     """Time tracking and acquisition."""
-    result = measure_speed(settings, clocks, pairs)
+    result = measure_speed(settings, clocks, cpu, pairs)
     if as_json:
         _print_json(_plain(dataclasses.asdict(result)))
         return
     console = Console()
-    console.print(f"{result.pairs} pairs tracked, {result.pairs_per_s:.0f} pairs/s on one core, link in memory")
-    console.print(f"track    {_percentiles(result.track_ms)}")
-    console.print(f"acquire  {_percentiles(result.acquire_ms)}")
+    core = "one core" if result.pinned else "whatever cores the system gave"
+    console.print(f"{result.pairs} pairs on {core}, frames and link in memory, log on disk")
+    console.print(
+        f"{result.pairs_per_cpu_s:.0f} pairs/s of the process's CPU time, {result.pairs_per_s:.0f} by the wall clock"
+    )
+    console.print(_stages_table(result))
+    console.print(
+        f"log thread {result.log_thread_ms:.3f} ms of CPU time and {result.log_bytes:.0f} bytes a pair, on average\n"
+    )
     console.print(to_text(result.run), soft_wrap=True)
 
 
@@ -84,10 +90,17 @@ def _row(result: Accuracy) -> list[str]:
     ]
 
 
-def _percentiles(spread: Percentiles) -> str:
-    if spread.p50 is None or spread.p99 is None or spread.max is None:
-        return "none"
-    return f"p50 {spread.p50:.2f} ms, p99 {spread.p99:.2f} ms, max {spread.max:.2f} ms a pair"
+def _stages_table(result: Speed) -> Table:
+    """Lay out where the time of a pair goes."""
+    table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
+    table.add_column("a pair (ms)")
+    for column in ("p50", "p95", "p99", "max"):
+        table.add_column(column, justify="right")
+    rows = {"whole pair": result.pair_ms, "acquisition": result.acquire_ms, **result.stages_ms}
+    for name, spread in rows.items():
+        figures = (spread.p50, spread.p95, spread.p99, spread.max)
+        table.add_row(name, *("-" if figure is None else f"{figure:.3f}" for figure in figures))
+    return table
 
 
 def _plain(value: object) -> object:

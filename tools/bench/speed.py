@@ -1,69 +1,129 @@
-"""How long the tracker takes, with the frames in memory."""
+"""How long a stereo pair takes through the whole loop on one core, log included, with the frames in memory."""
 
 from __future__ import annotations
 
+import tempfile
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain, islice
+from pathlib import Path
 
-from bridge.clock import StreamClock
+from bridge.clock import Nanoseconds, StreamClock
 from bridge.histogram import Histogram
+from bridge.links import open_link
 from bridge.monitor import Monitor
-from bridge.outlet import open_outlet
-from bridge.run import Outlets, run
+from bridge.outlet import Outlet
+from bridge.pack import MESSAGES, Encoder, Identity, Packer
+from bridge.run import Outlets, close, run
 from bridge.settings import Settings
 from bridge.summary import Percentiles, Summary
 from tools.bench.footage import Footage
+from tools.bench.one_core import one_core
+from tools.bench.stages import Stages, TimedLink, TimedMonitor, TimedPacker
 from tools.request import Clocks
-from tools.session import tracker_of
-from tracker.types import Event, Silence, TrackState
+from tools.session import recorder_of, tracker_of
+from tracker.intake import Intake
+from tracker.rounds import Rounds
+from tracker.types import Event, Frame, Silence, TrackState
 
 WARM_UP = 300  # instants: templates drawn, light learned
 LONG_AGO_NS = 3_600_000_000_000
+FRAMES_KEPT = 90  # instants
+SYNC_WINDOW_NS = 2_000_000  # the figures do not depend on it
+
+
+@dataclass(frozen=True, slots=True)
+class CpuClocks:
+    """Reads the CPU time of the whole process, and of the calling thread [ns]."""
+
+    process: Nanoseconds
+    thread: Nanoseconds
 
 
 @dataclass(frozen=True, slots=True)
 class Speed:
     """Tracking and acquisition on this machine.
 
-    pairs: measured.  pairs_per_s: through tracker, packing and a link in memory, one core.
-    track_ms: one stereo pair, tracked.  acquire_ms: one stereo pair, whole frames searched.
-    run: the loop's own figures, stage by stage.
+    pairs: measured.  pinned: whether the system held the process to one core.
+    pairs_per_s: by the wall clock; pairs_per_cpu_s: by the CPU time of the whole process, the log's thread included.
+    pair_ms: from a pair's first frame to the end of the loop's work on both.
+    acquire_ms: one stereo pair, whole frames searched.
+    stages_ms: of a pair or an estimate; the tracker's own, then those around it.
+    log_thread_ms: mean CPU time of the threads other than the loop's, which is the log's, a pair.
+    log_bytes: a pair, on the disk.
+    run: the loop's own figures.
     """
 
     pairs: int
+    pinned: bool
     pairs_per_s: float
-    track_ms: Percentiles
+    pairs_per_cpu_s: float
+    pair_ms: Percentiles
     acquire_ms: Percentiles
+    stages_ms: dict[str, Percentiles]
+    log_thread_ms: float
+    log_bytes: float
     run: Summary
 
 
-def measure_speed(settings: Settings, clocks: Clocks, pairs: int) -> Speed:
-    """Track a simulated flight from memory, then search it from nothing again and again."""
-    footage = Footage(settings, clocks, "figure8", 90)
-    tracker = tracker_of(settings, footage.rig, clocks)
-    outlet = open_outlet(
-        [("memory:", ("VISION_POSITION_ESTIMATE", "ATT_POS_MOCAP"))],
-        system_id=settings.mavlink.system_id,
-        component_id=settings.mavlink.component_id,
-        room_yaw_deg=settings.room.room_yaw_deg,
-        stopwatch=clocks.stopwatch,
-    )
-    outlets = Outlets(outlet, Monitor(tuple(camera.name for camera in footage.rig.cameras)))
-    tracking, clock = Histogram(), StreamClock()
-    spent_ns = 0
-    for k, pair in enumerate(footage.play(WARM_UP + pairs)):
-        if k == WARM_UP:
-            outlets = Outlets(outlet, Monitor(tuple(camera.name for camera in footage.rig.cameras)))
-        started_ns = clocks.stopwatch()
-        events: list[Event] = list(pair)
-        run(events, tracker, clock, outlets)
-        took_ns = clocks.stopwatch() - started_ns
-        if k >= WARM_UP:
-            tracking.add(took_ns)
-            spent_ns += took_ns
-    summary = outlets.summary(None)
-    outlet.close()
-    acquiring = _acquisition(settings, clocks, footage)
-    return Speed(pairs, pairs * 1e9 / spent_ns, tracking.percentiles(), acquiring, summary)
+def measure_speed(settings: Settings, clocks: Clocks, cpu: CpuClocks, pairs: int) -> Speed:
+    """Track a simulated flight from memory, log and all, then search it from nothing again and again."""
+    footage = Footage(settings, clocks, "figure8", FRAMES_KEPT)
+    with one_core() as pinned, tempfile.TemporaryDirectory() as folder:
+        log = Path(folder) / "bench.mcap"
+        stages, turns = Stages(clocks.stopwatch), Histogram()
+        tracker, played = tracker_of(settings, footage.rig, clocks), footage.play(WARM_UP + pairs)
+        names = tuple(camera.name for camera in footage.rig.cameras)
+        run(chain(*islice(played, WARM_UP)), tracker, StreamClock(), Outlets(Outlet([], Packer(0.0)), Monitor(names)))
+        packer = TimedPacker(settings.room.room_yaw_deg, stages)
+        identity = Identity(settings.mavlink.system_id, settings.mavlink.component_id)
+        link = TimedLink(open_link("memory:", Encoder(identity), clocks.stopwatch), stages)
+        recorder = recorder_of(log, settings, footage.rig, {"source": "bench"}, clocks, block_when_full=True)
+        outlets = Outlets(Outlet([(link, MESSAGES)], packer), TimedMonitor(names, stages), recorder)
+        clock = StreamClock()
+        started = clocks.stopwatch(), cpu.process(), cpu.thread()
+        try:
+            run(_timed(played, stages, turns, clocks.stopwatch), tracker, clock, outlets)
+        finally:
+            close(clock, outlets)
+        wall_ns, process_ns, thread_ns = (
+            now - then for now, then in zip((clocks.stopwatch(), cpu.process(), cpu.thread()), started, strict=True)
+        )
+        return Speed(
+            pairs,
+            pinned,
+            pairs * 1e9 / wall_ns,
+            pairs * 1e9 / process_ns,
+            turns.percentiles(),
+            _acquisition(settings, clocks, footage),
+            _front(footage, clocks.stopwatch) | stages.percentiles(),
+            (process_ns - thread_ns) / pairs / 1e6,
+            log.stat().st_size / pairs,
+            outlets.summary(str(log)),
+        )
+
+
+def _timed(
+    played: Iterator[tuple[Frame, ...]], stages: Stages, turns: Histogram, stopwatch: Nanoseconds
+) -> Iterator[Event]:
+    """Yield every frame, and time each pair until the loop asks for the next one."""
+    for pair in played:
+        started_ns = stopwatch()
+        yield from pair
+        turns.add(stopwatch() - started_ns)
+        stages.end_pair()
+
+
+def _front(footage: Footage, stopwatch: Nanoseconds) -> dict[str, Percentiles]:
+    """Time intake and rounds, which stand inside the tracker, by themselves on the same frames."""
+    stages = Stages(stopwatch)
+    intake, rounds = Intake(footage.rig), Rounds(len(footage.rig.cameras), SYNC_WINDOW_NS)
+    for pair in footage.play(4 * len(footage.pairs)):
+        for frame in pair:
+            stages.time("intake", intake.refuse, frame)
+            stages.time("rounds", rounds.take, frame)
+        stages.end_pair()
+    return stages.percentiles()
 
 
 def _acquisition(settings: Settings, clocks: Clocks, footage: Footage) -> Percentiles:
@@ -72,7 +132,7 @@ def _acquisition(settings: Settings, clocks: Clocks, footage: Footage) -> Percen
     histogram = Histogram()
     for k, pair in enumerate(footage.play(2 * len(footage.pairs))):
         lost = tracker.step(Silence(pair[0].t_ns + 2 * k * LONG_AGO_NS))
-        later = [type(frame)(frame.camera, frame.t_ns + (2 * k + 1) * LONG_AGO_NS, frame.image) for frame in pair]
+        later = [Frame(frame.camera, frame.t_ns + (2 * k + 1) * LONG_AGO_NS, frame.image) for frame in pair]
         started_ns = clocks.stopwatch()
         steps = [tracker.step(frame) for frame in later]
         if lost.state is not TrackState.TRACKING and k >= len(footage.pairs) and any(s.estimates for s in steps):
