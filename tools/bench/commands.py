@@ -13,7 +13,9 @@ from rich.table import Table
 from bridge.settings import Settings
 from bridge.summary import Percentiles, to_text
 from tools.bench.accuracy import Accuracy, measure_accuracy
+from tools.bench.consistency import Average, measure_consistency
 from tools.bench.memory import measure_memory
+from tools.bench.rooms import measure_rooms
 from tools.bench.speed import measure_speed
 from tools.request import Clocks
 
@@ -65,6 +67,49 @@ def bench_memory(pairs: int, settings: Settings, clocks: Clocks, as_json: bool) 
     console = Console()
     console.print(table)
     console.print(f"peak {result.peak_mb:.1f} MB, frames in memory included; log {result.log_mb:.1f} MB")
+
+
+def bench_consistency(seeds: int, gamma: float, as_json: bool) -> None:
+    """Compare the errors of simulated flights with what the filter said of them."""
+    result = measure_consistency(seeds, gamma)
+    if as_json:
+        _print_json(dataclasses.asdict(result))
+        return
+    table = Table("", "mean", "95 % band", "", "rms error", box=None, pad_edge=False)
+    units = {"position": "mm", "attitude": "deg", "velocity": "m/s", "rate": "deg/s"}
+    for name, unit in units.items():
+        table.add_row(f"NEES {name} / 3", *_average(result.nees[name]), f"{result.rms[name]:.3f} {unit}")
+    table.add_row("NIS / dof", *_average(result.nis), "")
+    console = Console()
+    console.print(table)
+    console.print(
+        f"{result.seeds} flights, gamma {result.gamma:g}, {result.instants} instants, "
+        f"{result.missing} of them without estimate; "
+        f"{result.wrong} of {result.estimates} estimates outside 5 sigma"
+    )
+
+
+def bench_rooms(settings: Settings, seed: int, as_json: bool) -> None:
+    """Show the accuracy in simulated rooms of many kinds."""
+    results = measure_rooms(settings, seed)
+    if as_json:
+        _print_json([dataclasses.asdict(result) for result in results])
+        return
+    names = ("poses", "mm mean", "max", "deg mean", "max", "NEES / 6", "wrong", "m/s rms", "deg/s rms")
+    table = Table("room", box=None, pad_edge=False)
+    for name in names:
+        table.add_column(name, justify="right", no_wrap=True)
+    for r in results:
+        errors = (f"{figure:.3f}" for figure in (r.mm_mean, r.mm_max, r.deg_mean, r.deg_max))
+        speeds = (f"{figure:.3f}" for figure in (r.speed_rms_m_s, r.rate_rms_deg_s))
+        table.add_row(r.name, f"{r.estimates}/{r.frames}", *errors, f"{r.nees:.2f}", str(r.wrong), *speeds)
+    console = Console()
+    Console(width=max(console.width, WIDTH)).print(table)
+
+
+def _average(value: Average) -> list[str]:
+    low, high = value.band
+    return [f"{value.mean:.2f}", f"{low:.2f}..{high:.2f}", "inside" if value.honest else "OUTSIDE"]
 
 
 def _with_method(settings: Settings, method: str) -> Settings:
