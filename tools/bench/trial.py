@@ -34,14 +34,15 @@ Spoil = Callable[[list[Event]], Iterable[Event]]
 class Trial:
     """What is flown and how it is seen.
 
-    path: a path of `sim:`.  timing: the truth about when the pictures are taken; its start is set back by lead_s.
+    path: a path of `sim:` by its name, or one of its own.  timing: the truth about when the pictures
+        are taken.
     look, seed: how the pictures look.
     stamp_errors_ns: by how much later than the truth each camera's stamps are; empty for none. The first camera's
         clock is that of the estimates, so its own should be 0.
     config: settings of the tracker, and of rig and marker where `rig` is None.
     """
 
-    path: str
+    path: str | ScriptedPath
     timing: SimTiming = field(default_factory=SimTiming)
     look: Look = field(default_factory=Look)
     seed: int = 0
@@ -51,7 +52,7 @@ class Trial:
 
     def vehicle(self) -> ScriptedPath:
         """Return the truth."""
-        return scripted_path(self.path, START_NS)
+        return scripted_path(self.path, START_NS) if isinstance(self.path, str) else self.path
 
 
 @dataclass(frozen=True, slots=True, eq=False)
