@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from scipy.ndimage import gaussian_filter
@@ -92,7 +94,7 @@ def test_the_pose_bound_is_the_covariance_of_a_weighted_fit() -> None:
     assert low < total < high
 
 
-def still_images(blur_px: float, gain: float) -> tuple[list[Image], Array]:
+def still_images(blur_px: float, gain: float) -> list[Image]:
     """Make images of a still slope with noise of variance 4 + gain * level in each channel, blurred or not."""
     rng = np.random.default_rng(8)
     scene = np.broadcast_to(np.linspace(60.0, 160.0, 200)[None, :, None], (150, 200, 3))
@@ -103,14 +105,19 @@ def still_images(blur_px: float, gain: float) -> tuple[list[Image], Array]:
             noise = gaussian_filter(noise, (blur_px, blur_px, 0.0))
             noise /= noise.std()
         images.append(np.clip(np.rint(scene + np.sqrt(4.0 + gain * scene) * noise), 0, 255).astype(np.uint8))
-    return images, np.ones((4, 150, 200), dtype=bool)
+    return images
+
+
+def measured(images: list[Image]) -> Noise:
+    everywhere = np.ones(images[0].shape[:2], dtype=bool)
+    return measure_noise([(before, after, everywhere) for before, after in pairwise(images)])
 
 
 def test_noise_is_measured_as_it_was_made() -> None:
-    noise = measure_noise(*still_images(0.0, 0.04))
+    noise = measured(still_images(0.0, 0.04))
     made = (4.0 + 0.04 * 110.0 + 1.0 / 12.0) * TO_YCC.T @ TO_YCC
-    measured = noise.axes @ np.diag(noise.variances) @ noise.axes.T
-    np.testing.assert_allclose(measured, made, atol=0.25)
+    found = noise.axes @ np.diag(noise.variances) @ noise.axes.T
+    np.testing.assert_allclose(found, made, atol=0.25)
     start, slope = noise.rise
     assert slope / start == pytest.approx(0.04 / 4.083, rel=0.25)
     lags = noise.correlations.copy()
@@ -119,13 +126,14 @@ def test_noise_is_measured_as_it_was_made() -> None:
 
 
 def test_whitened_noise_is_white_though_neighbours_share_it() -> None:
-    images, still = still_images(0.6, 0.0)
-    noise: Noise = measure_noise(images, still)
+    images = still_images(0.6, 0.0)
+    noise = measured(images)
+    whiteners = noise.whiteners(HALF)
     patches = []
     for v in range(0, 130, 17):
         for u in range(0, 180, 17):
             difference = (images[1][v : v + 17, u : u + 17].astype(float) - images[0][v : v + 17, u : u + 17]) @ TO_YCC
             luma = images[0][v : v + 17, u : u + 17].astype(float) @ TO_YCC[:, 0]
             flat = (difference / np.sqrt(2.0)).reshape(-1, 3, 1)
-            patches.append(noise.whitened(flat, np.full(17 * 17, luma.mean()), HALF))
+            patches.append(noise.whitened(flat, np.full(17 * 17, luma.mean()), whiteners))
     assert np.mean(np.square(patches)) == pytest.approx(1.0, abs=0.1)

@@ -12,7 +12,7 @@ from rich.table import Table
 
 from bridge.settings import Settings
 from bridge.summary import Percentiles, to_text
-from tools.bench.accuracy import Accuracy, measure_accuracy
+from tools.bench.accuracy import Accuracy, Limit, measure_accuracy
 from tools.bench.consistency import Average, measure_consistency
 from tools.bench.memory import measure_memory
 from tools.bench.rooms import measure_rooms
@@ -24,11 +24,8 @@ WIDTH = 140  # of the accuracy table; a narrower terminal wraps it
 
 def bench_accuracy(recordings: list[Path], settings: Settings, clocks: Clocks, as_json: bool) -> None:
     """Compare both methods with the truth of each recording."""
-    results = [
-        measure_accuracy(directory, _with_method(settings, method), clocks)
-        for directory in recordings
-        for method in ("ekf", "paper")
-    ]
+    methods = [_with_method(settings, method) for method in ("ekf", "paper")]
+    results = [result for directory in recordings for result in measure_accuracy(directory, methods, clocks)]
     if as_json:
         _print_json([dataclasses.asdict(result) for result in results])
         return
@@ -39,7 +36,28 @@ def bench_accuracy(recordings: list[Path], settings: Settings, clocks: Clocks, a
     for result in results:
         table.add_row(*_row(result))
     console = Console()
-    Console(width=max(console.width, WIDTH)).print(table)
+    wide = Console(width=max(console.width, WIDTH))
+    wide.print(table)
+    wide.print()
+    wide.print(_limits(results))
+
+
+def _limits(results: list[Accuracy]) -> Table:
+    """Return rms errors, Cramer-Rao bounds and their ratio, for each ball and for the pose."""
+    table = Table(box=None, pad_edge=False, title="rms error / Cramer-Rao bound = ratio", title_justify="left")
+    table.add_column("recording", no_wrap=True)
+    table.add_column("method", no_wrap=True)
+    for name in (*results[0].balls_px, "position", "attitude"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for result in results:
+        cells = [_cell(limit, "px") for limit in result.balls_px.values()]
+        pose = [_cell(result.position_limit_mm, "mm"), _cell(result.attitude_limit_deg, "deg")]
+        table.add_row(result.recording, result.method, *cells, *pose)
+    return table
+
+
+def _cell(limit: Limit, unit: str) -> str:
+    return f"{limit.rms:.3f} / {limit.bound:.3f} {unit} = {limit.ratio:.1f}"
 
 
 def bench_speed(pairs: int, settings: Settings, clocks: Clocks, as_json: bool) -> None:

@@ -29,39 +29,44 @@ class Noise:
     correlations: Array
     rise: tuple[float, float]
 
-    def whitened(self, values: Array, luma: Array, half: int) -> Array:
+    def whitened(self, values: Array, luma: Array, whiteners: Array) -> Array:
         """Return values (n, 3, q) on a patch, in luma and colour differences, in units of the noise, flat (3 n, q).
 
-        luma: (n,) expected, which sets how strong the noise is.
+        luma: (n,) expected, which sets how strong the noise is.  whiteners: of the patch.
         """
         strength = np.sqrt(np.maximum(self.rise[0] + self.rise[1] * luma, 0.05))
         parts = np.einsum("ncq,ck->nkq", values, self.axes) / strength[:, None, None]
         parts /= np.sqrt(self.variances)[None, :, None]
-        return np.concatenate([np.linalg.solve(self._factor(k, half), parts[:, k]) for k in range(3)])
+        return np.concatenate([whitener @ parts[:, k] for k, whitener in enumerate(whiteners)])
 
-    def _factor(self, k: int, half: int) -> Array:
-        """Return the lower Cholesky factor (n, n) of one component's correlation over a patch."""
-        span = np.arange(2 * half + 1)
-        u, v = (a.ravel() for a in np.meshgrid(span, span))
-        du, dv = np.abs(u[:, None] - u), np.abs(v[:, None] - v)
-        near = (du <= LAGS) & (dv <= LAGS)
-        matrix = np.where(near, self.correlations[k][np.minimum(dv, LAGS) + LAGS, np.minimum(du, LAGS) + LAGS], 0.0)
-        # Cut off at LAGS the function need not be one of a noise; what is negative then is too small to be measured.
-        values, vectors = np.linalg.eigh(matrix)
-        return np.asarray(np.linalg.cholesky(vectors * np.maximum(values, 0.05) @ vectors.T))
+    def whiteners(self, half: int) -> Array:
+        """Return for each component the matrix (3, n, n) that makes its noise white over a patch."""
+        return np.stack([_whitener(self.correlations[k], half) for k in range(3)])
 
 
-def measure_noise(images: Sequence[Image], still: Array) -> Noise:
+def _whitener(correlation: Array, half: int) -> Array:
+    """Return the inverse root (n, n) of a correlation (2 LAGS + 1, 2 LAGS + 1) over a patch."""
+    span = np.arange(2 * half + 1)
+    u, v = (a.ravel() for a in np.meshgrid(span, span))
+    du, dv = np.abs(u[:, None] - u), np.abs(v[:, None] - v)
+    near = (du <= LAGS) & (dv <= LAGS)
+    matrix = np.where(near, correlation[np.minimum(dv, LAGS) + LAGS, np.minimum(du, LAGS) + LAGS], 0.0)
+    # Cut off at LAGS the function need not be one of a noise; what is negative then is too small to be measured.
+    values, vectors = np.linalg.eigh(matrix)
+    return np.asarray((vectors / np.sqrt(np.maximum(values, 0.05))).T)
+
+
+def measure_noise(pairs: Sequence[tuple[Image, Image, Array]]) -> Noise:
     """Measure the noise of a camera that does not move.
 
     Args:
-        images: in order of time.  still: (len(images) - 1, h, w) bool, where image k + 1 shows what image k does.
+        pairs: two images each, and where both show the same (h, w) bool.
     """
     covariance, correlations, levels, squares = np.zeros((3, 3)), [], [], []
-    for before, after, same in zip(images, images[1:], still, strict=False):
+    for before, after, same in pairs:
         ycc = [image.astype(np.float64) @ TO_YCC for image in (before, after)]
         difference = (ycc[1] - ycc[0]) / np.sqrt(2.0)
-        covariance += np.cov(difference[same].T) / len(still)
+        covariance += np.cov(difference[same].T) / len(pairs)
         levels.append((ycc[0][..., 0] + ycc[1][..., 0])[same] / 2.0)
         squares.append(difference[..., 0][same] ** 2)
         correlations.append((difference, same))

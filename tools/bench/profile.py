@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from tracker.types import Array
 
@@ -42,16 +43,25 @@ def draw(disc: Disc, offset_px: Array, half: int) -> Drawn:
     axis = np.arange(-reach * PER_PX, reach * PER_PX + 1) / PER_PX
     length = math.hypot(*disc.streak_px)
     places = math.ceil(3.0 * length) | 1
-    sharp = np.zeros((TERMS, len(axis), len(axis)))
+    sharp = np.zeros((TERMS, len(axis), len(axis)), dtype=np.float32)
     for k in range(places):
         at = offset_px + ((k + 0.5) / places - 0.5) * np.asarray(disc.streak_px)
-        sharp += _sharp((axis - at[0]) / disc.radius_px, (axis - at[1])[:, None] / disc.radius_px, disc.radius_px)
+        cols, rows = (np.flatnonzero(np.abs(axis - middle) <= disc.radius_px + 0.5) for middle in at)
+        near = np.s_[:, rows[0] : rows[-1] + 1, cols[0] : cols[-1] + 1]
+        x, y = (axis[cols] - at[0]) / disc.radius_px, (axis[rows] - at[1])[:, None] / disc.radius_px
+        sharp[near] += _sharp(x, y, disc.radius_px) / places
     kernel = _kernel(disc.blur_px)
-    fine = np.stack([cv2.sepFilter2D(each / places, -1, kernel, kernel) for each in sharp])
-    down, across = np.gradient(fine, 1.0 / PER_PX, axis=(1, 2))
-    pixels = slice(2 * PER_PX, len(axis) - 2 * PER_PX, PER_PX)
-    shapes, du, dv = (plane[:, pixels, pixels].reshape(TERMS, -1) for plane in (fine, across, down))
-    return Drawn(np.asarray(shapes), np.stack((-du, -dv), axis=2))
+    fine = np.stack([cv2.sepFilter2D(each, -1, kernel, kernel) for each in sharp]).astype(np.float32, copy=False)
+    shapes, left, right, above, below = (
+        _at_pixels(fine, du, dv) for du, dv in ((0, 0), (-1, 0), (1, 0), (0, -1), (0, 1))
+    )
+    return Drawn(shapes, np.stack((left - right, above - below), axis=2) * (PER_PX / 2.0))
+
+
+def _at_pixels(fine: NDArray[np.float32], du: int, dv: int) -> Array:
+    """Read the grid off at the pixels' centres, moved by some of its steps (TERMS, n)."""
+    rows, cols = (slice(2 * PER_PX + d, fine.shape[1] - 2 * PER_PX + d, PER_PX) for d in (dv, du))
+    return fine[:, rows, cols].reshape(TERMS, -1).astype(np.float64)
 
 
 def plane(half: int) -> Array:
