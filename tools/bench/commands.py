@@ -47,17 +47,16 @@ def _limits(results: list[Accuracy]) -> Table:
     table = Table(box=None, pad_edge=False, title="rms error / Cramer-Rao bound = ratio", title_justify="left")
     table.add_column("recording", no_wrap=True)
     table.add_column("method", no_wrap=True)
-    for name in (*results[0].balls_px, "position", "attitude"):
+    for name in (*(f"{ball} px" for ball in results[0].balls_px), "position mm", "attitude deg"):
         table.add_column(name, justify="right", no_wrap=True)
     for result in results:
-        cells = [_cell(limit, "px") for limit in result.balls_px.values()]
-        pose = [_cell(result.position_limit_mm, "mm"), _cell(result.attitude_limit_deg, "deg")]
-        table.add_row(result.recording, result.method, *cells, *pose)
+        limits = (*result.balls_px.values(), result.position_limit_mm, result.attitude_limit_deg)
+        table.add_row(result.recording, result.method, *(_cell(limit) for limit in limits))
     return table
 
 
-def _cell(limit: Limit, unit: str) -> str:
-    return f"{limit.rms:.3f} / {limit.bound:.3f} {unit} = {limit.ratio:.1f}"
+def _cell(limit: Limit) -> str:
+    return f"{limit.rms:.3f} / {limit.bound:.3f} = {limit.ratio:.1f}"
 
 
 def bench_speed(pairs: int, settings: Settings, clocks: Clocks, as_json: bool) -> None:
