@@ -48,7 +48,7 @@ def test_twice_the_noise_makes_twice_the_bound() -> None:
 
 
 def test_a_poses_bound_is_that_of_its_balls_by_their_distance() -> None:
-    """Each ball is known to b Z / f across each ray, so the mean of three to about that over the root of their number."""
+    """A ball is known to b Z / f across each ray; the mean of three, to that over the root of three."""
     bounds, truth = measured(3000.0)
     poses = pose_bounds(bounds, RIG, truth)
     assert len(poses) == PAIRS
