@@ -2,4 +2,5 @@
 
 from tools.cli import main
 
-main()
+if __name__ == "__main__":  # a bench's processes import this file again
+    main()

@@ -225,3 +225,28 @@ def memory(
     from tools.bench.commands import bench_memory
 
     bench_memory(pairs, load_settings(config), _clocks(), json)
+
+
+@bench.command()
+def consistency(
+    seeds: Annotated[int, typer.Option(help="Simulated flights.", min=1)] = 50,
+    gamma: Annotated[float, typer.Option(help="Of the simulated cameras; 1 is linear.", min=1.0, max=3.0)] = 2.2,
+    json: JsonOption = False,
+) -> None:
+    """Fly many simulated flights and see whether the filter's covariance is true."""
+    from tools.bench.commands import bench_consistency
+
+    bench_consistency(seeds, gamma, json)
+
+
+@bench.command()
+def rooms(
+    seed: Annotated[int, typer.Option(help="Same seed, same flight, same noise.", min=0)] = 1,
+    config: ConfigOption = "lab",
+    json: JsonOption = False,
+) -> None:
+    """Track simulated flights in other light, through other cameras, at other speeds."""
+    from bridge.settings import load_settings
+    from tools.bench.commands import bench_rooms
+
+    bench_rooms(load_settings(config), seed, json)

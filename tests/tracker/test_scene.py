@@ -11,7 +11,7 @@ import pytest
 from tests.tracker.paper_rig import paper_rig
 from tracker import so3
 from tracker.rig import Rig
-from tracker.scene import Look, Occluder, Pose, SceneRenderer, Trouble
+from tracker.scene import Look, Occluder, Pose, SceneRenderer, Sphere, Trouble, hand
 from tracker.scene.ball import BallPainter, RayMap
 from tracker.types import Array, Image
 
@@ -41,7 +41,7 @@ def balls_px(rig: Rig, camera: int, at: Pose) -> Array:
 def test_a_ball_covers_the_pixels_its_projection_says_to_a_fiftieth_of_a_pixel(rig: Rig, camera: int) -> None:
     """The cover's centroid lies at the projected centre and its area is that of the disc, lens distortion and all."""
     eye = rig.cameras[camera]
-    painter = BallPainter(eye, RayMap(eye), rig.marker.balls, Look())
+    painter = BallPainter(eye, RayMap(eye), [0.0075] * 3, [ball.colour.bgr for ball in rig.marker.balls], Look())
     rng = np.random.default_rng(1)
     for _ in range(40):
         x, y, z, yaw = rng.uniform((-0.3, -0.3, -0.3, -3.0), (0.3, 0.3, 0.3, 3.0)).tolist()
@@ -161,3 +161,67 @@ def test_a_jpeg_round_trip_changes_the_picture_a_little(rig: Rig) -> None:
         for quality in (0, 90)
     )
     assert 0.0 < np.abs(plain - packed).mean() < 3.0
+
+
+def quiet_picture(rig: Rig, trouble: Trouble, camera: int = 0, look: Look = QUIET) -> Array:
+    rendered = SceneRenderer(rig, look, backdrops=grey_room()).render(camera, [pose()], trouble)
+    return np.asarray(rendered, dtype=np.float64)
+
+
+def test_linear_grey_levels_are_light_and_those_of_a_screen_are_its_root(rig: Rig) -> None:
+    """Half the light: half the grey level, or 2 ** (-1 / 2.2) of it."""
+    for gamma in (1.0, 2.2):
+        look = replace(QUIET, gamma=gamma)
+        full, half = (quiet_picture(rig, Trouble(light_gain=gain), look=look)[200, 100, 0] for gain in (1.0, 0.5))
+        assert half / full == pytest.approx(0.5 ** (1.0 / gamma), rel=0.01)
+
+
+def test_light_of_another_colour_changes_each_channel_by_its_own_factor(rig: Rig) -> None:
+    linear = replace(QUIET, gamma=1.0)
+    white, tinted = (
+        quiet_picture(rig, trouble, look=linear)[100:140, 100:140].mean(axis=(0, 1))
+        for trouble in (Trouble(), Trouble(gains_bgr=(1.2, 1.0, 0.8)))
+    )
+    assert (tinted / white).tolist() == pytest.approx([1.2, 1.0, 0.8], rel=0.01)
+
+
+def test_the_light_is_as_before_when_the_trouble_is_over(rig: Rig) -> None:
+    renderer = SceneRenderer(rig, replace(QUIET, chroma_noise=0.0), backdrops=grey_room())
+    before, _, after = (renderer.render(0, [pose()], Trouble(light_gain=gain)) for gain in (1.0, 0.5, 1.0))
+    assert np.array_equal(before, after)
+
+
+@pytest.mark.parametrize("camera", [0, 1])
+def test_a_thing_in_the_room_is_seen_where_it_stands_by_every_camera(rig: Rig, camera: int) -> None:
+    p_inW = (0.2, -0.3, 0.1)
+    picture = quiet_picture(rig, Trouble(things=(Sphere(p_inW, 0.0075, (17, 91, 205)),)), camera)
+    difference = np.abs(picture - quiet_picture(rig, Trouble(), camera)).sum(axis=2)
+    rows, columns = np.indices(difference.shape)
+    centroid = np.array([(difference * columns).sum(), (difference * rows).sum()]) / difference.sum()
+    np.testing.assert_allclose(centroid, rig.cameras[camera].project(np.array([p_inW]))[0][0], atol=0.7)
+
+
+@pytest.mark.parametrize(("towards_m", "hidden"), [(0.3, True), (-0.3, False)])
+def test_a_hand_before_the_marker_hides_it_and_one_behind_does_not(rig: Rig, towards_m: float, hidden: bool) -> None:
+    eye = rig.cameras[0]
+    green_inW = rig.marker.points_inB[1] @ pose()[1].T + pose()[0]
+    to_camera = (eye.p_CinW - green_inW) / np.linalg.norm(eye.p_CinW - green_inW)
+    trouble = Trouble(things=hand(green_inW + towards_m * to_camera, np.array([0.0, 0.0, 1.0])))
+    u, v = balls_px(rig, 0, pose())[1].round().astype(int)
+    blue, green, red = quiet_picture(rig, trouble)[v, u]
+    assert (red > green > blue) == hidden
+
+
+def test_a_ball_painted_anew_shows_the_other_colour(rig: Rig) -> None:
+    paints = [ball.colour.bgr for ball in rig.marker.balls]
+    swapped = quiet_picture(rig, Trouble(repainted=((1, paints[2]), (2, paints[1]))))
+    for ball, other in ((1, 2), (2, 1)):
+        u, v = balls_px(rig, 0, pose())[ball].round().astype(int)
+        colour = swapped[v, u] / swapped[v, u].sum()
+        np.testing.assert_allclose(colour, np.array(paints[other]) / sum(paints[other]), atol=0.12)
+
+
+def test_a_broken_picture_is_whole_above_and_garbage_below(rig: Rig) -> None:
+    whole, broken = (quiet_picture(rig, trouble) for trouble in (Trouble(), Trouble(broken_from=0.4)))
+    assert np.array_equal(whole[:192], broken[:192])
+    assert np.abs(whole[192:] - broken[192:]).mean() > 10.0

@@ -12,8 +12,10 @@ from rich.table import Table
 
 from bridge.settings import Settings
 from bridge.summary import to_text
-from tools.bench.accuracy import Accuracy, measure_accuracy
+from tools.bench.accuracy import Accuracy, Limit, measure_accuracy
+from tools.bench.consistency import Average, measure_consistency
 from tools.bench.memory import measure_memory
+from tools.bench.rooms import measure_rooms
 from tools.bench.speed import CpuClocks, Speed, measure_speed
 from tools.request import Clocks
 
@@ -22,11 +24,8 @@ WIDTH = 140  # of the accuracy table; a narrower terminal wraps it
 
 def bench_accuracy(recordings: list[Path], settings: Settings, clocks: Clocks, as_json: bool) -> None:
     """Compare both methods with the truth of each recording."""
-    results = [
-        measure_accuracy(directory, _with_method(settings, method), clocks)
-        for directory in recordings
-        for method in ("ekf", "paper")
-    ]
+    methods = [_with_method(settings, method) for method in ("ekf", "paper")]
+    results = [result for directory in recordings for result in measure_accuracy(directory, methods, clocks)]
     if as_json:
         _print_json([dataclasses.asdict(result) for result in results])
         return
@@ -37,7 +36,27 @@ def bench_accuracy(recordings: list[Path], settings: Settings, clocks: Clocks, a
     for result in results:
         table.add_row(*_row(result))
     console = Console()
-    Console(width=max(console.width, WIDTH)).print(table)
+    wide = Console(width=max(console.width, WIDTH))
+    wide.print(table)
+    wide.print()
+    wide.print(_limits(results))
+
+
+def _limits(results: list[Accuracy]) -> Table:
+    """Return rms errors, Cramer-Rao bounds and their ratio, for each ball and for the pose."""
+    table = Table(box=None, pad_edge=False, title="rms error / Cramer-Rao bound = ratio", title_justify="left")
+    table.add_column("recording", no_wrap=True)
+    table.add_column("method", no_wrap=True)
+    for name in (*(f"{ball} px" for ball in results[0].balls_px), "position mm", "attitude deg"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for result in results:
+        limits = (*result.balls_px.values(), result.position_limit_mm, result.attitude_limit_deg)
+        table.add_row(result.recording, result.method, *(_cell(limit) for limit in limits))
+    return table
+
+
+def _cell(limit: Limit) -> str:
+    return f"{limit.rms:.3f} / {limit.bound:.3f} = {limit.ratio:.1f}"
 
 
 def bench_speed(pairs: int, settings: Settings, clocks: Clocks, cpu: CpuClocks, as_json: bool) -> None:
@@ -71,6 +90,49 @@ def bench_memory(pairs: int, settings: Settings, clocks: Clocks, as_json: bool) 
     console = Console()
     console.print(table)
     console.print(f"peak {result.peak_mb:.1f} MB, frames in memory included; log {result.log_mb:.1f} MB")
+
+
+def bench_consistency(seeds: int, gamma: float, as_json: bool) -> None:
+    """Compare the errors of simulated flights with what the filter said of them."""
+    result = measure_consistency(seeds, gamma)
+    if as_json:
+        _print_json(dataclasses.asdict(result))
+        return
+    table = Table("", "mean", "95 % band", "", "rms error", box=None, pad_edge=False)
+    units = {"position": "mm", "attitude": "deg", "velocity": "m/s", "rate": "deg/s"}
+    for name, unit in units.items():
+        table.add_row(f"NEES {name} / 3", *_average(result.nees[name]), f"{result.rms[name]:.3f} {unit}")
+    table.add_row("NIS / dof", *_average(result.nis), "")
+    console = Console()
+    console.print(table)
+    console.print(
+        f"{result.seeds} flights, gamma {result.gamma:g}, {result.instants} instants, "
+        f"{result.missing} of them without estimate; "
+        f"{result.wrong} of {result.estimates} estimates outside 5 sigma"
+    )
+
+
+def bench_rooms(settings: Settings, seed: int, as_json: bool) -> None:
+    """Show the accuracy in simulated rooms of many kinds."""
+    results = measure_rooms(settings, seed)
+    if as_json:
+        _print_json([dataclasses.asdict(result) for result in results])
+        return
+    names = ("poses", "mm mean", "max", "deg mean", "max", "NEES / 6", "wrong", "m/s rms", "deg/s rms")
+    table = Table("room", box=None, pad_edge=False)
+    for name in names:
+        table.add_column(name, justify="right", no_wrap=True)
+    for r in results:
+        errors = (f"{figure:.3f}" for figure in (r.mm_mean, r.mm_max, r.deg_mean, r.deg_max))
+        speeds = (f"{figure:.3f}" for figure in (r.speed_rms_m_s, r.rate_rms_deg_s))
+        table.add_row(r.name, f"{r.estimates}/{r.frames}", *errors, f"{r.nees:.2f}", str(r.wrong), *speeds)
+    console = Console()
+    Console(width=max(console.width, WIDTH)).print(table)
+
+
+def _average(value: Average) -> list[str]:
+    low, high = value.band
+    return [f"{value.mean:.2f}", f"{low:.2f}..{high:.2f}", "inside" if value.honest else "OUTSIDE"]
 
 
 def _with_method(settings: Settings, method: str) -> Settings:

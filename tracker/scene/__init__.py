@@ -4,8 +4,10 @@ Nothing here is shared with the detector: colour is made by light, paint and sen
 ray-traced, not drawn as a circle.
 """
 
-from tracker.scene.look import Look, Occluder, Trouble
+from tracker.scene.look import Look
 from tracker.scene.render import SceneRenderer
+from tracker.scene.thing import Bar, Sphere, hand
+from tracker.scene.trouble import Occluder, Trouble
 from tracker.scene.vehicle import Pose
 
-__all__ = ["Look", "Occluder", "Pose", "SceneRenderer", "Trouble"]
+__all__ = ["Bar", "Look", "Occluder", "Pose", "SceneRenderer", "Sphere", "Trouble", "hand"]

@@ -53,10 +53,10 @@ def airframe(marker: Marker) -> tuple[Rod, ...]:
 class RodPainter:
     """Paint one rod as one camera sees it: a straight band, since over its few pixels a lens bends nothing."""
 
-    def __init__(self, camera: Camera, rod: Rod, light: float) -> None:
+    def __init__(self, camera: Camera, rod: Rod, light: float, gamma: float) -> None:
         self._camera = camera
         self._rod = rod
-        self._light = (to_light(np.array(rod.bgr, dtype=np.uint8)) * light).astype(np.float32)
+        self._light = (to_light(np.array(rod.bgr, dtype=np.uint8), gamma) * light).astype(np.float32)
 
     def paint(self, ends_px: Array, depth_m: float) -> list[Stamp] | None:
         """Paint the rod between pixels ends_px (k, 2, 2) at k instants at a depth [m]; None where out of sight."""
@@ -89,12 +89,12 @@ def _band(ends_px: Array, half_px: float, width: int, height: int) -> Plane:
 class RotorPainter:
     """Paint the turning rotor's see-through disc."""
 
-    def __init__(self, camera: Camera, marker: Marker) -> None:
+    def __init__(self, camera: Camera, marker: Marker, gamma: float) -> None:
         self._camera = camera
         angle = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
         rim = _ROTOR_RADIUS_M * np.column_stack((np.cos(angle), np.sin(angle), np.zeros_like(angle)))
         self.rim_inB: Array = rim + marker.points_inB.mean(axis=0) + (0.0, 0.0, _ROTOR_HEIGHT_M)
-        self._light = to_light(np.array(_BLADE, dtype=np.uint8))
+        self._light = to_light(np.array(_BLADE, dtype=np.uint8), gamma)
 
     def paint(self, rim_px: Array) -> Stamp | None:
         """Paint the disc within its rim (40, 2) [px]; None where out of sight."""

@@ -10,13 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.camera import Camera
-from tracker.rig import Ball
 from tracker.scene.look import Look
 from tracker.scene.sensor import Plane, to_light
 from tracker.types import Array
 
 MARGIN_PX = 48
 _SUPERSAMPLING = 3
+
+Bgr = tuple[int, int, int]
 
 
 class RayMap:
@@ -57,28 +58,35 @@ class Stamp:
 
 
 class BallPainter:
-    """Paint all balls of a marker as one camera sees them."""
+    """Paint balls as one camera sees them."""
 
-    def __init__(self, camera: Camera, rays: RayMap, balls: Sequence[Ball], look: Look) -> None:
+    def __init__(
+        self, camera: Camera, rays: RayMap, radii_m: Sequence[float], colours: Sequence[Bgr], look: Look
+    ) -> None:
+        """Take each ball's radius [m] and typical colour, 0..255."""
         self._camera = camera
         self._rays = rays
-        self._radius_m = np.array([ball.radius_m for ball in balls])
+        self._radius_m = np.array(radii_m)
         # The paint's colour is how the ball looks on average over its disc, about where the light adds up to one.
-        self._albedo = to_light(np.array([ball.colour.bgr for ball in balls], dtype=np.uint8))
+        self._albedo = to_light(np.array(colours, dtype=np.uint8), look.gamma)
         self._look = look
         lamp_inW = np.array(look.lamp_inW) / np.linalg.norm(look.lamp_inW)
         self._lamp_inC = camera.R_CtoW.T @ lamp_inW
         self._up_inC = camera.R_CtoW[2]
 
-    def paint(self, p_inC: Array, uv_px: Array) -> list[list[Stamp | None]]:
+    def paint(self, p_inC: Array, uv_px: Array, repainted: Sequence[tuple[int, Bgr]] = ()) -> list[list[Stamp | None]]:
         """Paint the balls at k instants.
 
         Args:
             p_inC: (k, balls, 3) centres [m].  uv_px: (k, balls, 2) their pixels.
+            repainted: balls, by index, of another colour than their own.
         Returns:
             For each instant a stamp for each ball, None where it is out of sight.
         """
         instants, balls = p_inC.shape[:2]
+        albedo = self._albedo.copy()
+        for ball, bgr in repainted:
+            albedo[ball] = to_light(np.array(bgr, dtype=np.uint8), self._look.gamma)
         stamps: list[Stamp | None] = [None] * (instants * balls)
         centres, radius_m = p_inC.reshape(-1, 3), np.tile(self._radius_m, instants)
         if (centres[:, 2] > 2.0 * radius_m).all():
@@ -90,12 +98,12 @@ class BallPainter:
             if not len(inside):
                 return [stamps[k * balls : (k + 1) * balls] for k in range(instants)]
             rays = self._rays.window(corners[inside], size)
-            layers = self._trace(rays, centres[inside], inside % balls).reshape(-1, size, size, 4)
+            layers = self._trace(rays, centres[inside], inside % balls, albedo).reshape(-1, size, size, 4)
             for k, layer in zip(inside.tolist(), layers, strict=True):
                 stamps[k] = Stamp(int(corners[k, 0]), int(corners[k, 1]), layer)
         return [stamps[k * balls : (k + 1) * balls] for k in range(instants)]
 
-    def _trace(self, rays: tuple[Array, Array], p_inC: Array, which: NDArray[np.int64]) -> Plane:
+    def _trace(self, rays: tuple[Array, Array], p_inC: Array, which: NDArray[np.int64], albedo: Plane) -> Plane:
         """Meet rays x, y (k, n, s) with balls `which` (k,) at p_inC (k, 3); return colour and cover (k, n, 4).
 
         With ray d, centre c, b = d.c: the ray passes the centre at distance sqrt(c.c - b^2/d.d) and meets the sphere
@@ -112,7 +120,7 @@ class BallPainter:
         t = (b - np.sqrt(np.maximum(b * b - dd * (cc - r * r), 0.0))) / dd
         matt, mirror = self._shade(((t * x - cx) / r, (t * y - cy) / r, (t - cz) / r), p_inC)
         layer = np.empty((*x.shape[:2], 4), dtype=np.float32)
-        layer[..., :3] = (cover * matt).mean(axis=2)[..., None] * self._albedo[which, None]
+        layer[..., :3] = (cover * matt).mean(axis=2)[..., None] * albedo[which, None]
         layer[..., :3] += (cover * mirror).mean(axis=2)[..., None]
         layer[..., 3] = cover.mean(axis=2)
         return layer

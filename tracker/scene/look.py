@@ -1,4 +1,4 @@
-"""How the simulated room is lit and seen, and what may go wrong with it."""
+"""How the simulated room is lit and seen."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ class Look:
     read_noise: one sigma of the read-out, as a share of white.
     chroma_noise: share of the noise's deviation that is not common to the three channels, 0..1.
     jpeg_quality: 1..100 for a JPEG round trip with chroma at half size, as USB cameras give; 0 for none.
+    gamma: grey levels go with light to the power 1 / gamma: 2.2 as cameras make pictures for screens; 1.0 linear, where
+        ball and room mix in grey levels as they do in light.
     """
 
     lamp_inW: tuple[float, float, float] = (0.35, -0.25, 0.9)
@@ -31,30 +33,4 @@ class Look:
     read_noise: float = 0.0010
     chroma_noise: float = 0.5
     jpeg_quality: int = 0
-
-
-@dataclass(frozen=True, slots=True)
-class Occluder:
-    """A flat thing held before one camera: an upright rectangle in its image [px] and its colour."""
-
-    camera: int
-    u_px: int
-    v_px: int
-    width_px: int
-    height_px: int
-    bgr: tuple[int, int, int] = (60, 60, 60)
-
-
-@dataclass(frozen=True, slots=True)
-class Trouble:
-    """What spoils a picture on purpose.
-
-    light_gain: factor on all light; 0.2 is a blind drawn, 2 a lamp switched on.
-    occluders: things held before the cameras.
-    """
-
-    light_gain: float = 1.0
-    occluders: tuple[Occluder, ...] = ()
-
-
-NO_TROUBLE = Trouble()
+    gamma: float = 2.2

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -10,8 +11,9 @@ import numpy as np
 from tracker.camera import Camera
 from tracker.rig import Marker, Rig
 from tracker.scene.backdrop import backdrop, vignette
-from tracker.scene.look import NO_TROUBLE, Look, Trouble
+from tracker.scene.look import Look
 from tracker.scene.sensor import Plane, Sensor, to_light
+from tracker.scene.trouble import AS_LIT, NO_TROUBLE, Trouble
 from tracker.scene.vehicle import Pose, VehiclePainter
 from tracker.types import Image
 
@@ -50,7 +52,7 @@ class SceneRenderer:
             trouble: what spoils the picture.
         """
         occluders = tuple(each for each in trouble.occluders if each.camera == camera)
-        return self._views[camera].render(poses, Trouble(trouble.light_gain, occluders))
+        return self._views[camera].render(poses, replace(trouble, occluders=occluders))
 
 
 class _View:
@@ -63,31 +65,37 @@ class _View:
         self._camera = camera
         self._look = look
         self._vignette = np.ascontiguousarray(np.broadcast_to(vignette(*size), (size[1], size[0], 3)))
-        self._backdrop: Plane = _blurred(to_light(room), look.blur_px) * self._vignette
+        self._backdrop: Plane = _blurred(to_light(room, look.gamma), look.blur_px) * self._vignette
         self._sensor = Sensor(*size, look, rng)
+        self._gain = AS_LIT
         self._still = self._sensor.develop(self._backdrop)
         self._vehicle = VehiclePainter(camera, marker, look)
 
     def render(self, poses: Sequence[Pose], trouble: Trouble) -> Image:
         """Render one image."""
-        display, sigma = self._still if trouble.light_gain == 1.0 else self._lit(trouble.light_gain)
+        gain = self._light(trouble.gain_bgr)
+        display, sigma = self._still
         noise = self._sensor.next_noise()
         image = self._sensor.expose(display, sigma, noise)
-        vehicle = self._vehicle.paint(poses)
+        vehicle = self._vehicle.paint(poses, trouble)
         if vehicle is not None:
             window = (
                 slice(vehicle.v_px, vehicle.v_px + len(vehicle.layer)),
                 slice(vehicle.u_px, vehicle.u_px + vehicle.layer.shape[1]),
             )
-            patch = self._behind(vehicle.layer, window) * np.float32(trouble.light_gain)
+            patch = self._behind(vehicle.layer, window) * gain
             image[window] = self._sensor.expose(*self._sensor.develop(patch), noise[window])
         for each in trouble.occluders:
             corner = (each.u_px + each.width_px, each.v_px + each.height_px)
             cv2.rectangle(image, (each.u_px, each.v_px), corner, each.bgr, cv2.FILLED)
-        return self._sensor.compress(image)
+        return _broken(self._sensor.compress(image), trouble.broken_from)
 
-    def _lit(self, gain: float) -> tuple[Plane, Plane]:
-        return self._sensor.develop(self._backdrop * np.float32(gain))
+    def _light(self, gain_bgr: tuple[float, float, float]) -> Plane:
+        """Light the backdrop anew if the light has changed; return the gain (3,)."""
+        gain = np.array(gain_bgr, dtype=np.float32)
+        if gain_bgr != self._gain:
+            self._gain, self._still = gain_bgr, self._sensor.develop(self._backdrop * gain)
+        return gain
 
     def _behind(self, vehicle: Plane, window: tuple[slice, slice]) -> Plane:
         """Blur the vehicle's layer (h, w, 4) by the lens and put the backdrop behind it; return the light (h, w, 3)."""
@@ -100,3 +108,12 @@ def _blurred(plane: Plane, sigma_px: float) -> Plane:
     if sigma_px <= 0:
         return plane
     return np.asarray(cv2.GaussianBlur(plane, (0, 0), sigma_px), dtype=np.float32)
+
+
+def _broken(image: Image, share: float) -> Image:
+    """Spoil the rows below a share of the height: shifted and off in colour, as after a lost marker in a JPEG."""
+    first = round(share * len(image))
+    if first >= len(image):
+        return image
+    shifted = np.roll(image[first:], image.shape[1] // 3, axis=1).astype(np.int64) + np.array([40, 0, 70])
+    return np.concatenate((image[:first], shifted.clip(0, 255).astype(np.uint8)))

@@ -11,14 +11,13 @@ from tracker.types import Image
 
 Plane = NDArray[np.float32]
 
-GAMMA = 2.2
 _LEVELS = 1 << 14
 _BANK_MARGIN_PX = 96
 
 
-def to_light(display: Image | Plane) -> Plane:
-    """Return the light, 0..1, behind display values 0..255."""
-    return np.asarray((np.asarray(display, dtype=np.float32) / 255.0) ** GAMMA, dtype=np.float32)
+def to_light(display: Image | Plane, gamma: float) -> Plane:
+    """Return the light, 0..1, behind display values 0..255 of a camera's gamma."""
+    return np.asarray((np.asarray(display, dtype=np.float32) / 255.0) ** gamma, dtype=np.float32)
 
 
 class Sensor:
@@ -35,9 +34,9 @@ class Sensor:
         self._look = look
         self._rng = rng
         light = (np.arange(_LEVELS, dtype=np.float64) / (_LEVELS - 1)).clip(0.25 / _LEVELS)
-        slope = 255.0 / GAMMA * light ** (1.0 / GAMMA - 1.0)
+        slope = 255.0 / look.gamma * light ** (1.0 / look.gamma - 1.0)
         sigma = slope * np.sqrt(light / look.full_well_e + look.read_noise**2)
-        self._display = (255.0 * light ** (1.0 / GAMMA)).astype(np.float32)
+        self._display = (255.0 * light ** (1.0 / look.gamma)).astype(np.float32)
         self._sigma = np.minimum(sigma, 6.0).astype(np.float32)
         self._bank = self._noise_bank()
         self._product = np.empty((height_px, width_px, 3), dtype=np.float32)

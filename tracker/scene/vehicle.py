@@ -9,9 +9,11 @@ import numpy as np
 from tracker.camera import Camera
 from tracker.rig import Marker
 from tracker.scene.airframe import RodPainter, RotorPainter, airframe
-from tracker.scene.ball import BallPainter, RayMap, Stamp
+from tracker.scene.ball import BallPainter, Bgr, RayMap, Stamp
 from tracker.scene.look import Look
 from tracker.scene.sensor import Plane
+from tracker.scene.thing import ThingPainter
+from tracker.scene.trouble import NO_TROUBLE, Trouble
 from tracker.types import Array
 
 Pose = tuple[Array, Array]
@@ -31,25 +33,31 @@ class VehiclePainter:
         rods = airframe(marker)
         light = look.ambient + 0.5 * look.diffuse
         self._camera = camera
-        self._balls = BallPainter(camera, RayMap(camera), marker.balls, look)
-        self._tubes = [RodPainter(camera, rod, light) for rod in rods if rod.ball is not None]
-        self._body = [RodPainter(camera, rod, light) for rod in rods if rod.ball is None]
-        self._rotor = RotorPainter(camera, marker)
+        rays = RayMap(camera)
+        radii_m, colours = [ball.radius_m for ball in marker.balls], [ball.colour.bgr for ball in marker.balls]
+        self._balls = BallPainter(camera, rays, radii_m, colours, look)
+        self._things = ThingPainter(camera, rays, look)
+        self._tubes = [RodPainter(camera, rod, light, look.gamma) for rod in rods if rod.ball is not None]
+        self._body = [RodPainter(camera, rod, light, look.gamma) for rod in rods if rod.ball is None]
+        self._rotor = RotorPainter(camera, marker, look.gamma)
         ends = [end for rod in rods for end in (rod.a_inB, rod.b_inB)]
         self._points_inB = np.concatenate((marker.points_inB, np.array(ends), self._rotor.rim_inB))
         first, second = len(marker), len(marker) + 2 * len(self._tubes)
         self._parts = (first, second, second + 2 * len(self._body))
 
-    def paint(self, poses: Sequence[Pose]) -> Stamp | None:
-        """Paint the vehicle's mean over the poses; None where none of it is in sight."""
+    def paint(self, poses: Sequence[Pose], trouble: Trouble = NO_TROUBLE) -> Stamp | None:
+        """Paint the vehicle's mean over the poses and the things about it; None where none of it is in sight.
+
+        What is farther than the marker goes behind the vehicle, what is nearer before it.
+        """
         places = np.concatenate([self._points_inB @ R_BtoW.T + p_BinW for p_BinW, R_BtoW in poses])
         p_inC = self._camera.in_camera(places).reshape(len(poses), -1, 3)
         uv_px = self._camera.project(places)[0].reshape(len(poses), -1, 2)
         if not np.isfinite(uv_px).all():
             return None
-        moving = self._moving(p_inC, uv_px)
+        moving = self._moving(p_inC, uv_px, trouble.repainted)
         middle = len(poses) // 2
-        body = list(self._still(p_inC[middle], uv_px[middle]))
+        body = [*self._still(p_inC[middle], uv_px[middle]), *self._things.paint(trouble.things)]
         hub_m = float(np.linalg.norm(p_inC[middle, : self._parts[0]], axis=1).mean())
         frame = self._frame([stamp for instant in moving for stamp in instant] + [stamp for _, stamp in body])
         if frame is None:
@@ -63,10 +71,10 @@ class VehiclePainter:
                 _lay_over(frame, stamp)
         return frame
 
-    def _moving(self, p_inC: Array, uv_px: Array) -> list[list[Stamp]]:
+    def _moving(self, p_inC: Array, uv_px: Array, repainted: Sequence[tuple[int, Bgr]]) -> list[list[Stamp]]:
         """Return for each instant the balls and tubes in sight, farthest first."""
         first, second, _ = self._parts
-        balls = self._balls.paint(p_inC[:, :first], uv_px[:, :first])
+        balls = self._balls.paint(p_inC[:, :first], uv_px[:, :first], repainted)
         tubes = [
             painter.paint(uv_px[:, k : k + 2], float(p_inC[0, k, 2]))
             for k, painter in zip(range(first, second, 2), self._tubes, strict=True)

@@ -12,15 +12,20 @@ import numpy as np
 
 from tracker import so3
 from tracker.errors import OperatorError
+from tracker.sources.random_flight import random_flight
 from tracker.types import Array
 
 Pose = tuple[Array, Array]
 """p_BinW (3,) [m] and R_BtoW (3, 3)."""
 
+Motion = tuple[Array, Array]
+"""v_BinW (3,) [m/s] and w_BinB (3,) [rad/s]."""
+
 PathFunction = Callable[[float], Pose]
 """Pose by the time since the start [s]."""
 
 PROTOCOL_RATE_HZ = 15.0
+DIFFERENCE_S = 1e-3
 _GRAVITY = 9.81
 _MAX_TILT = math.radians(20.0)
 _STEP_M, _TILT_STEP, _YAW_STEP = 0.05, math.radians(5.0), math.radians(10.0)
@@ -49,16 +54,38 @@ class ScriptedPath:
         """Return the pose at t_ns [ns]; before the start it waits there."""
         return self.path(max(t_ns - self.start_ns, 0) / 1e9)
 
+    def motion_at(self, t_ns: int) -> Motion:
+        """Return v_BinW (3,) [m/s] and w_BinB (3,) [rad/s] at t_ns [ns]: none before the start."""
+        if t_ns <= self.start_ns:
+            return np.zeros(3), np.zeros(3)
+        return motion(self.path, (t_ns - self.start_ns) / 1e9)
+
 
 def scripted_path(name: str, start_ns: int) -> ScriptedPath:
-    """Find a path by its name.
+    """Find a path by its name: one of PATHS, or random-SEED for a flight made up from a number.
 
     Raises:
         OperatorError: no path of that name.
     """
+    seed = name.removeprefix("random-")
+    if seed != name and seed.isdecimal():
+        return ScriptedPath(name, random_flight(int(seed)), start_ns)
     if name not in PATHS:
-        raise OperatorError(f"source sim:{name}: no path of that name; known are {', '.join(PATHS)}")
+        known = ", ".join((*PATHS, "random-SEED"))
+        raise OperatorError(f"source sim:{name}: no path of that name; known are {known}")
     return ScriptedPath(name, PATHS[name], start_ns)
+
+
+def motion(path: PathFunction, t_s: float) -> Motion:
+    """Return v_BinW (3,) [m/s] and w_BinB (3,) [rad/s] of a smooth path at a time [s].
+
+    Source: central differences over +/-h and +/-2h, whose errors of order h^2 cancel; the angle between R(t - h) and
+        R(t + h) is odd in h as the distance is, so it goes the same way. What is left is about 1e-9.
+    """
+    (p0, R0), (p1, R1), (p2, R2), (p3, R3) = (path(t_s + k * DIFFERENCE_S) for k in (-2, -1, 1, 2))
+    v_BinW = (8.0 * (p2 - p1) - (p3 - p0)) / (12.0 * DIFFERENCE_S)
+    w_BinB = (8.0 * so3.log(R1.T @ R2) - so3.log(R0.T @ R3)) / (12.0 * DIFFERENCE_S)
+    return v_BinW, w_BinB
 
 
 def _hover(t_s: float) -> Pose:

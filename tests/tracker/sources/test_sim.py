@@ -12,13 +12,15 @@ from tests.tracker.paper_rig import paper_rig
 from tracker import so3
 from tracker.errors import OperatorError
 from tracker.rig import Rig
-from tracker.sources.paths import PATHS, Pose, scripted_path
+from tracker.sources.paths import PATHS, PathFunction, Pose, motion, scripted_path
 from tracker.sources.sim import START_NS, SimSource, SimTiming
 from tracker.types import Array, Event, Frame, frozen_array
 
 DT_S = 1e-3
 TIMES_S = np.arange(0.0, 16.0, 0.05)
-SMOOTH = tuple(name for name in PATHS if name != "protocol")
+RANDOM = tuple(f"random-{seed}" for seed in range(8))
+SMOOTH = (*(name for name in PATHS if name != "protocol"), *RANDOM)
+ALL = (*PATHS, *RANDOM)
 SLACK = 1.01
 
 
@@ -31,11 +33,15 @@ def ticks() -> int:
     return 0
 
 
+def path(name: str) -> PathFunction:
+    return scripted_path(name, 0).path
+
+
 def speeds(name: str) -> tuple[Array, Array]:
     """Return velocity (n, 3) [m/s] and body rates (n, 3) [rad/s] along a path, by finite differences."""
     velocity, rate = [], []
     for t_s in TIMES_S:
-        (p0, R0), (p1, R1) = (PATHS[name](t_s + k * DT_S) for k in (0, 1))
+        (p0, R0), (p1, R1) = (path(name)(t_s + k * DT_S) for k in (0, 1))
         velocity.append((p1 - p0) / DT_S)
         rate.append(so3.log(R0.T @ R1) / DT_S)
     return np.array(velocity), np.array(rate)
@@ -48,10 +54,36 @@ def test_a_path_keeps_the_papers_speeds(name: str) -> None:
     assert np.abs(velocity[:, 2]).max() <= 2.5 * SLACK
 
 
-@pytest.mark.parametrize("name", PATHS)
+@pytest.mark.parametrize("name", RANDOM)
+def test_a_random_flight_turns_no_faster_than_the_paper_and_moves_at_all(name: str) -> None:
+    velocity, rate = speeds(name)
+    assert np.linalg.norm(rate, axis=1).max() <= math.radians(90.0)
+    assert np.linalg.norm(velocity, axis=1).max() > 0.4
+    assert np.linalg.norm(rate, axis=1).max() > math.radians(20.0)
+
+
+@pytest.mark.parametrize("name", SMOOTH)
+def test_velocity_and_rate_carry_a_pose_on_to_the_next(name: str) -> None:
+    """By the classical fourth-order Runge-Kutta rule for the place, and Simpson's mean of the rate for the turn."""
+    step = 0.01
+    for t_s in (0.5, 1.7, 2.9):
+        moved, turned = zip(*(motion(path(name), t_s + share * step) for share in (0.0, 0.5, 1.0)), strict=True)
+        (p0, R0), (p1, R1) = path(name)(t_s), path(name)(t_s + step)
+        np.testing.assert_allclose(p0 + step * (moved[0] + 4 * moved[1] + moved[2]) / 6.0, p1, atol=1e-9)
+        mean = step * (turned[0] + 4 * turned[1] + turned[2]) / 6.0
+        np.testing.assert_allclose(R0 @ so3.exp(mean), R1, atol=2e-6)
+
+
+def test_a_seed_makes_one_flight_and_another_seed_another() -> None:
+    first, again, other = (path(name)(1.0)[0] for name in ("random-3", "random-3", "random-4"))
+    np.testing.assert_array_equal(first, again)
+    assert np.linalg.norm(first - other) > 0.01
+
+
+@pytest.mark.parametrize("name", ALL)
 def test_a_path_keeps_the_papers_tilt(name: str) -> None:
     for t_s in TIMES_S:
-        roll, pitch, _ = so3.to_euler(PATHS[name](t_s)[1])
+        roll, pitch, _ = so3.to_euler(path(name)(t_s)[1])
         assert max(abs(roll), abs(pitch)) <= math.radians(20.0) * SLACK
 
 
@@ -62,10 +94,10 @@ def test_the_fast_path_reaches_the_papers_limits() -> None:
     assert np.abs(rate[:, 2]).max() >= math.radians(85.0)
 
 
-@pytest.mark.parametrize("name", PATHS)
+@pytest.mark.parametrize("name", ALL)
 def test_both_cameras_see_every_ball_all_along_a_path(name: str, rig: Rig) -> None:
     for t_s in TIMES_S:
-        p_BinW, R_BtoW = PATHS[name](t_s)
+        p_BinW, R_BtoW = path(name)(t_s)
         for camera in rig.cameras:
             uv_px, _ = camera.project(rig.marker.points_inB @ R_BtoW.T + p_BinW)
             assert all(camera.sees(uv, margin_px=6.0) for uv in uv_px)
@@ -86,7 +118,7 @@ def test_the_protocol_moves_one_step_a_frame_as_the_paper_did() -> None:
 
 
 def test_an_unknown_path_is_refused_with_the_names_of_those_there_are() -> None:
-    with pytest.raises(OperatorError, match=r"sim:loop.*hover, square, figure8, protocol, fast"):
+    with pytest.raises(OperatorError, match=r"sim:loop.*hover, square, figure8, protocol, fast, random-SEED"):
         scripted_path("loop", 0)
 
 
