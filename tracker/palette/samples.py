@@ -57,7 +57,9 @@ def vehicle_mask(shape: tuple[int, ...], seen: Sequence[BallPixels]) -> Image:
         hull = cv2.convexHull(np.array([np.rint(one.uv_px) for one in seen], dtype=np.int32))
         cv2.fillConvexPoly(mask, hull, 255)
         reach = int(np.ceil(2.0 * max(one.radius_px for one in seen))) + 3
-        mask = np.asarray(cv2.dilate(mask, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1,) * 2)), np.uint8)
+        mask = np.asarray(
+            cv2.dilate(mask, cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1,) * 2)), np.uint8
+        )
     return mask
 
 
