@@ -87,8 +87,8 @@ def _watch(request: ColoursRequest, settings: Settings, clocks: Clocks) -> tuple
         gathering = gather(opened.source, sizes_px, request.frames)
     if not gathering.kept:
         raise OperatorError(
-            f"colours {request.source}: no instant with a picture of each of {len(sizes_px)} cameras, within 50 ms and of "
-            "the calibration's size; check that every camera gives frames"
+            f"colours {request.source}: no instant with a picture of each of {len(sizes_px)} cameras, within 50 ms and "
+            "of the calibration's size; check that every camera gives frames"
         )
     return rig, gathering
 

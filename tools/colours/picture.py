@@ -20,7 +20,7 @@ Bgr = tuple[int, int, int]
 WHITE, GREY, PAPER = (255, 255, 255), (170, 170, 170), (24, 24, 24)
 CLASH, CLOSE, FALSE = (255, 0, 255), (230, 190, 60), (60, 60, 255)
 ZOOM, INSET_PX, SEAM = 6, 25, 6
-LINE_PX, MOST_LINES = 18, 8
+LINE_PX, MOST_LINES = 18, 12
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 
@@ -48,11 +48,12 @@ def draw_palette(palette: Palette, path: Path) -> None:
 
 def _column(palette: Palette, seen: Seen, frame: Frame) -> Image:
     """Return one camera's picture, the balls enlarged below it."""
-    image = frame.image.copy()
+    image: Image = frame.image.copy()
     camera = palette.rig.cameras[frame.camera]
-    for clash in shown_clashes(palette):
+    clashes = list(enumerate(shown_clashes(palette), 1))
+    for number, clash in clashes:
         if clash.camera == frame.camera:
-            _hatch(image, clash, palette.balls[clash.ball].name)
+            _hatch(image, clash, str(number))
     places = {ball.ball: ball for ball in seen.balls if ball.camera == frame.camera}
     for ball, blobs in enumerate(look_everywhere(frame, camera, palette.rig)):
         for blob in blobs:
@@ -61,10 +62,15 @@ def _column(palette: Palette, seen: Seen, frame: Frame) -> Image:
             name = palette.balls[ball].name
             if true:
                 _circle(image, blob.uv_px, f"{name} {blob.area_px:.0f} px", WHITE)
-            else:
+            elif not any(clash.camera == frame.camera and _within(blob.uv_px, clash) for _, clash in clashes):
                 _circle(image, blob.uv_px, f"{name}? {blob.area_px:.0f} px", FALSE)
     _text(image, camera.name, (10, 22), WHITE, 0.6)
     return np.vstack((image, _strip(palette, seen, frame)))
+
+
+def _within(uv_px: Array, clash: Clash) -> bool:
+    region = clash.region
+    return bool(region.left - 2 <= uv_px[0] <= region.right + 1 and region.top - 2 <= uv_px[1] <= region.bottom + 1)
 
 
 def _circle(image: Image, uv_px: Array, label: str, colour: Bgr) -> None:
@@ -82,13 +88,15 @@ def _label(image: Image, label: str, at: tuple[int, int], reach: int, colour: Bg
 
 
 def _text(image: Image, text: str, at: tuple[int, int], colour: Bgr, size: float) -> None:
-    """Write on a dark outline, legible on any picture."""
-    cv2.putText(image, text, at, _FONT, size, (0, 0, 0), 3, cv2.LINE_AA)
+    """Write on a darkened ground, legible on any picture."""
+    (width, height), base = cv2.getTextSize(text, _FONT, size, 1)
+    ground = image[max(at[1] - height - 3, 0) : at[1] + base, max(at[0] - 2, 0) : at[0] + width + 2]
+    ground[:] = ground // 3
     cv2.putText(image, text, at, _FONT, size, colour, 1, cv2.LINE_AA)
 
 
-def _hatch(image: Image, clash: Clash, name: str) -> None:
-    """Box a region, with stripes across, and say whose colour it has."""
+def _hatch(image: Image, clash: Clash, number: str) -> None:
+    """Box a region, with stripes across, and give it the number of its line in the legend."""
     colour = CLASH if clash.serious else CLOSE
     left, top = max(clash.region.left - 3, 0), max(clash.region.top - 3, 0)
     right, bottom = min(clash.region.right + 2, image.shape[1] - 1), min(clash.region.bottom + 2, image.shape[0] - 1)
@@ -99,7 +107,7 @@ def _hatch(image: Image, clash: Clash, name: str) -> None:
             cv2.line(lines, (start, part.shape[0]), (start + part.shape[0], 0), colour, 1)
     part[:] = cv2.addWeighted(part, 0.45, lines, 0.55, 0.0)
     cv2.rectangle(image, (left, top), (right, bottom), colour, 1)
-    _label(image, f"{name}: {clash.area_px} px", (right, (top + bottom) // 2), 5, colour)
+    _label(image, number, (right, (top + bottom) // 2), 5, colour)
 
 
 def _strip(palette: Palette, seen: Seen, frame: Frame) -> Image:
@@ -138,7 +146,10 @@ def _legend(palette: Palette, width: int) -> Image:
         ("red circle: found, but not the marker's ball", FALSE),
         ("hatched: background that is taken for a ball or hides one     thin box: background that nearly is", CLASH),
     ]
-    lines += [(clash_line(clash, palette), CLASH if clash.serious else CLOSE) for clash in shown[:MOST_LINES]]
+    lines += [
+        (f"{number}: {clash_line(clash, palette)}", CLASH if clash.serious else CLOSE)
+        for number, clash in enumerate(shown[:MOST_LINES], 1)
+    ]
     if len(shown) > MOST_LINES:
         lines.append((f"and {len(shown) - MOST_LINES} more", GREY))
     legend = np.full((LINE_PX * len(lines) + 12, width, 3), PAPER, dtype=np.uint8)

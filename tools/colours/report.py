@@ -19,10 +19,11 @@ def to_text(palette: Palette, verdict: Verdict, source: str) -> str:
     before, after = palette.searched
     seen = len(palette.seen)
     lines = [
-        f"Colours of {source}: marker found in {seen} of {palette.instants} instants, carried over {palette.moved_m:.2f} m",
-        f"The tracker's own search finds it in {after} of {seen} of them with the learned colours, {before} with the old",
+        f"Colours of {source}: marker found in {seen} of {palette.instants} instants, moved {palette.moved_m:.2f} m",
+        f"The tracker's own search finds it in {after} of these {seen} with the learned colours, {before} with the old",
         "",
-        f"{'ball':<10}{'':>9}{'hue deg':>16}{'saturation':>12}{'value':>8}{'to next hue':>22}  seen in {', '.join(names)}",
+        f"{'ball':<10}{'':>9}{'hue deg':>16}{'saturation':>12}{'value':>8}{'to next hue':>22}"
+        f"  seen in {', '.join(names)}",
     ]
     for lesson, reasons in zip(palette.balls, verdict.against, strict=True):
         lines += [_row("old", lesson.name, lesson.old), _row("new", "", lesson.new) + _seen(lesson)]
@@ -85,6 +86,9 @@ def _background(palette: Palette) -> list[str]:
     shown = shown_clashes(palette)
     if not shown:
         return ["Nothing in the room has a ball's colour."]
-    lines = [f"{'CLASH' if clash.serious else 'close'}: {clash_line(clash, palette)}" for clash in shown[:MOST_LINES]]
+    lines = [
+        f"{number:>3} {'CLASH' if clash.serious else 'close'}: {clash_line(clash, palette)}"
+        for number, clash in enumerate(shown[:MOST_LINES], 1)
+    ]
     more = len(palette.clashes) - len(lines)
     return lines + ([f"and {more} more, less so: see --json"] if more > 0 else [])

@@ -46,13 +46,13 @@ def clash_line(clash: Clash, palette: Palette) -> str:
     ball, camera = palette.balls[clash.ball].name, palette.rig.cameras[clash.camera].name
     box = clash.region
     where = f"{camera}, columns {box.left}..{box.right - 1}, rows {box.top}..{box.bottom - 1}"
-    what = f"{clash.area_px} px of hue {clash.hue_deg:.0f} deg, {clash.apart_deg:.0f} deg and {clash.apart_sigma:.1f} sigma"
+    apart = f"{clash.apart_deg:.0f} deg and {clash.apart_sigma:.1f} sigma"
     end, remedy = {
         ClashKind.LOOKS_LIKE: ("is taken for a ball", "cover or remove it, or repaint the ball"),
         ClashKind.HIDES: ("hides the ball before it", "cover it, or repaint the ball"),
         ClashKind.CLOSE: ("nearly passes as the ball", "keep the light as it is, or cover it"),
     }[clash.kind]
-    return f"{where}: {what} from {ball}, {end}; {remedy}"
+    return f"{where}: {clash.area_px} px of hue {clash.hue_deg:.0f} deg, {apart} from {ball}, {end}; {remedy}"
 
 
 def shown_clashes(palette: Palette) -> list[Clash]:
@@ -70,15 +70,15 @@ def _against(ball: int, lesson: BallLesson, palette: Palette, names: tuple[str, 
         yield f"seen too seldom ({seen}; at least {LEAST_SIGHTINGS} in two cameras): show it for longer"
     if lesson.gap_deg < LEAST_GAP_DEG:
         yield (
-            f"its hues lie {lesson.gap_deg:.0f} deg from those of {lesson.neighbour}, at least {LEAST_GAP_DEG:.0f} deg: "
+            f"its hues lie {lesson.gap_deg:.0f} deg from those of {lesson.neighbour}, needed {LEAST_GAP_DEG:.0f} deg: "
             + (
-                "set all cameras to one white balance"
+                "set one white balance for all cameras"
                 if _apart_deg(lesson) > CAMERAS_APART_DEG
                 else "repaint one of them"
             )
         )
     if lesson.paint.saturation < PALE_SATURATION:
-        yield f"pale: saturation {lesson.paint.saturation:.2f}, at least {PALE_SATURATION}: less glare or stronger paint"
+        yield f"pale: saturation {lesson.paint.saturation:.2f}, least {PALE_SATURATION}: less glare or stronger paint"
     if lesson.paint.value < DARK_VALUE:
         yield f"dark: value {lesson.paint.value:.2f}, at least {DARK_VALUE}: more light or a longer exposure"
     serious = [clash for clash in palette.clashes if clash.ball == ball and clash.serious]
@@ -93,18 +93,19 @@ def _general(palette: Palette) -> Iterator[str]:
     found = palette.searched[1] / len(palette.seen)
     if found < FOUND_SHARE:
         yield (
-            f"with these colours the tracker finds the marker in {100 * found:.0f} % of the instants in which it is seen, "
-            f"at least {100 * FOUND_SHARE:.0f} %: see the balls' reasons, and the picture"
+            f"with these colours the tracker finds the marker in {100 * found:.0f} % of the instants that show "
+            f"it, at least {100 * FOUND_SHARE:.0f} %: see the balls' reasons, and the picture"
         )
 
 
 def _notes(palette: Palette, names: tuple[str, ...]) -> Iterator[str]:
     if len(palette.seen) < LEAST_FOUND * palette.instants:
-        yield f"the marker was found in {len(palette.seen)} of {palette.instants} instants only; keep it in two cameras' view"
+        found = f"only {len(palette.seen)} of {palette.instants} instants"
+        yield f"the marker was found in {found}; keep it in view of two cameras"
     if palette.moved_m < STILL_M:
         yield (
-            f"the vehicle moved {100 * palette.moved_m:.0f} cm, less than {100 * STILL_M:.0f} cm: balls were seen in one "
-            "light and the room behind them was not seen; carry it around"
+            f"the vehicle moved {100 * palette.moved_m:.0f} cm, less than {100 * STILL_M:.0f} cm: balls were seen in "
+            "one light and the room behind them was not seen; carry it around"
         )
     elif palette.unknown > 0:
         yield f"{100 * palette.unknown:.2f} % of the pictures were never seen without the vehicle, and not checked"

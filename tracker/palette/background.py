@@ -9,6 +9,7 @@ from enum import StrEnum
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from tracker.detect import ASPECT_MAX, FILL_MIN, MIN_AREA_PX, Region, colour_mask
 from tracker.look import LEAST_AREA_SHARE, MOST_AREA_SHARE
@@ -22,6 +23,9 @@ LEAST_SEEN = 3  # pictures without the vehicle that a pixel needs
 CLOSE_HUE_DEG, CLOSE_SHARE = 8.0, 0.85  # hue beyond the box; share of its least saturation and value
 CLOSE_SIGMA = 4.0  # of the ball's own colours
 SPREAD_FLOOR = 0.05  # of chroma, one sigma: what light and noise change at the least
+
+Pixels = tuple[NDArray[np.intp], NDArray[np.intp]]
+"""Rows and columns."""
 
 
 class ClashKind(StrEnum):
@@ -127,27 +131,38 @@ def _wider(colour: Colour) -> Colour:
     )
 
 
-def _parts(
-    mask: Image, radii_px: tuple[float, float]
-) -> list[tuple[ClashKind, Region, tuple[np.ndarray[tuple[int, ...], np.dtype[np.intp]], ...]]]:
-    """Return kind, rectangle and pixels (rows, columns) of the connected parts of a mask that matter to a ball."""
-    least, most = LEAST_AREA_SHARE * math.pi * radii_px[0] ** 2, MOST_AREA_SHARE * math.pi * radii_px[1] ** 2
+def _parts(mask: Image, radii_px: tuple[float, float]) -> list[tuple[ClashKind, Region, Pixels]]:
+    """Return kind, rectangle and pixels of the parts of a mask that matter to a ball, neighbours taken together."""
+    reach = 2 * math.ceil(radii_px[1]) + 1
+    joined = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((reach, reach), dtype=np.uint8))
+    groups = cv2.connectedComponents(joined, connectivity=8)[1]
     count, labels, stats, _ = cv2.connectedComponentsWithStats(mask, connectivity=8)
-    parts = []
+    worst: dict[int, ClashKind] = {}
     for k in range(1, count):
-        left, top, width, height, area = (int(x) for x in stats[k])
-        if area < max(MIN_AREA_PX, least):
-            continue
-        round_ = area >= FILL_MIN * width * height and max(width, height) <= ASPECT_MAX * min(width, height) + 1
-        if round_ and area <= most:
-            kind = ClashKind.LOOKS_LIKE
-        elif area >= math.pi * radii_px[0] ** 2:
-            kind = ClashKind.HIDES
-        else:
-            continue
-        rows, columns = np.nonzero(labels[top : top + height, left : left + width] == k)
-        parts.append((kind, Region(left, top, left + width, top + height), (rows + top, columns + left)))
+        kind = _kind(stats[k], radii_px)
+        if kind is not None:
+            left, top, width, _, _ = (int(x) for x in stats[k])
+            group = int(groups[top, left + int(np.flatnonzero(labels[top, left : left + width] == k)[0])])
+            if worst.get(group) is not ClashKind.LOOKS_LIKE:
+                worst[group] = kind
+    parts = []
+    for group, kind in worst.items():
+        rows, columns = np.nonzero((groups == group) & (mask > 0))
+        region = Region(int(columns.min()), int(rows.min()), int(columns.max()) + 1, int(rows.max()) + 1)
+        parts.append((kind, region, (rows, columns)))
     return parts
+
+
+def _kind(stats: NDArray[np.int32], radii_px: tuple[float, float]) -> ClashKind | None:
+    """Say what a connected part (left, top, width, height, area) does to a ball, by the detector's limits."""
+    _, _, width, height, area = (int(x) for x in stats)
+    least, most = LEAST_AREA_SHARE * math.pi * radii_px[0] ** 2, MOST_AREA_SHARE * math.pi * radii_px[1] ** 2
+    if area < max(MIN_AREA_PX, least):
+        return None
+    round_ = area >= FILL_MIN * width * height and max(width, height) <= ASPECT_MAX * min(width, height) + 1
+    if round_ and area <= most:
+        return ClashKind.LOOKS_LIKE
+    return ClashKind.HIDES if area >= math.pi * radii_px[0] ** 2 else None
 
 
 def _clash(camera: int, ball: int, kind: ClashKind, region: Region, shown: Image, paint: Paint) -> Clash:

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tracker.palette.chroma import chroma, hsv_of, hue_from
 from tracker.rig import Colour
@@ -19,6 +20,7 @@ MARGIN_MAX_DEG = 16.0  # about what a cast of 20 % turns a hue by
 MARGIN_SHARES = (1.0, 0.6, 0.3)
 MARGIN_MIN_DEG = 3.0
 SATURATION_SHARES = (0.5, 0.65, 0.8)  # of the limb's; half the light halves the value and leaves the saturation
+SATURATION_CUTS = (10.0, 25.0)  # percentiles that a box may cut off where the room has the hue: pale pixels of the edge
 VALUE_SHARES = (0.4, 0.55, 0.75)
 SATURATION_FLOOR, VALUE_FLOOR = 0.15, 0.06  # below these a hue is noise
 GUARD = (4.0, 0.03, 0.03)  # hue [deg], saturation, value: what noise adds to a background pixel
@@ -34,7 +36,7 @@ class Paint:
     hsv (n, 3): pixels of all cameras, hue [deg], saturation, value 0..1.  chroma (n, 2): theirs.
     bgr: their median.
     middle_deg: circular mean of the hues.  low_deg, high_deg: where nearly all lie, from the middle [deg].
-    saturation, value: of the dark limb.
+    saturation, value: of the dark limb.  cuts: higher saturations that a box may ask for, ascending.
     """
 
     hsv: Array
@@ -45,6 +47,7 @@ class Paint:
     high_deg: float
     saturation: float
     value: float
+    cuts: tuple[float, ...]
 
 
 def paint_seen(pixels: Image) -> Paint:
@@ -55,9 +58,18 @@ def paint_seen(pixels: Image) -> Paint:
     middle_deg = float(np.degrees(np.arctan2(np.sin(angles).mean(), np.cos(angles).mean()))) % 360.0
     low_deg, high_deg = (float(x) for x in np.percentile(hue_from(sure[:, 0], middle_deg), CORE))
     saturation, value = (float(np.percentile(sure[:, k], LIMB)) for k in (1, 2))
+    cuts = tuple(float(x) for x in np.percentile(sure[:, 1], SATURATION_CUTS))
     blue, green, red = (round(float(x)) for x in np.median(pixels, axis=0))
     return Paint(
-        hsv, chroma(pixels).astype(np.float64), (blue, green, red), middle_deg, low_deg, high_deg, saturation, value
+        hsv,
+        chroma(pixels).astype(np.float64),
+        (blue, green, red),
+        middle_deg,
+        low_deg,
+        high_deg,
+        saturation,
+        value,
+        cuts,
     )
 
 
@@ -89,9 +101,7 @@ def learn_boxes(paints: Sequence[Paint], backgrounds: Sequence[Image]) -> list[C
     return [boxes[ball] for ball in range(len(paints))]
 
 
-def holds(
-    colour: Colour, hsv: Array, guard: tuple[float, float, float] = (0.0, 0.0, 0.0)
-) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+def holds(colour: Colour, hsv: Array, guard: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> NDArray[np.bool_]:
     """Say which pixels (n, 3) lie in a box widened by a guard in hue [deg], saturation and value."""
     away = np.abs(hue_from(hsv[:, 0], colour.hue_deg))
     return np.asarray(
@@ -108,22 +118,22 @@ def _free(gap: float) -> float:
 
 def _widest(paint: Paint, free: tuple[float, float], room: Array) -> Colour:
     """Return the widest box with the least background in it."""
-    steps = (MARGIN_SHARES, MARGIN_SHARES, SATURATION_SHARES, VALUE_SHARES)
-    tried = [(share, _box(paint, free, *share)) for share in itertools.product(*steps)]
+    saturations = (*(share * paint.saturation for share in SATURATION_SHARES), *paint.cuts)
+    choices = itertools.product(
+        *(enumerate(each) for each in (MARGIN_SHARES, MARGIN_SHARES, saturations, VALUE_SHARES))
+    )
+    # By how many steps each is narrower than the widest.
+    tried = [(sum(step for step, _ in one), _box(paint, free, *(value for _, value in one))) for one in choices]
     near = room[holds(tried[0][1], room, GUARD)]
     counts = [int(holds(box, near, GUARD).sum()) for _, box in tried]
     allowed = max(FEW_PIXELS, round(1.1 * min(counts)))
-    _, best = max(
-        ((share, box) for (share, box), count in zip(tried, counts, strict=True) if count <= allowed),
-        key=lambda one: one[0][0] + one[0][1] - one[0][2] - one[0][3],
-    )
-    return best
+    return min((one for one, count in zip(tried, counts, strict=True) if count <= allowed), key=lambda one: one[0])[1]
 
 
 def _box(
     paint: Paint, free: tuple[float, float], below: float, above: float, saturation: float, value: float
 ) -> Colour:
-    """Return one box: shares of the free margins below and above, of the limb's saturation and value."""
+    """Return one box: shares of the free margins below and above, least saturation, share of the limb's value."""
     low_deg = paint.low_deg - _margin(free[0], below)
     high_deg = paint.high_deg + _margin(free[1], above)
     tolerance_deg = min(max((high_deg - low_deg) / 2.0, HUE_STEP_DEG / 2.0), TOLERANCE_MAX_DEG)
@@ -131,7 +141,7 @@ def _box(
     return Colour(
         hue_deg=round(hue_deg, 1) % 360.0,
         hue_tolerance_deg=round(max(0.5, math.floor(tolerance_deg * 10.0) / 10.0 - 0.1), 1),
-        saturation_min=round(max(SATURATION_FLOOR, saturation * paint.saturation), 3),
+        saturation_min=round(max(SATURATION_FLOOR, saturation), 3),
         value_min=round(max(VALUE_FLOOR, value * paint.value), 3),
         bgr=paint.bgr,
     )

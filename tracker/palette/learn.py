@@ -157,8 +157,8 @@ def _find_marker(instants: Sequence[Instant], rig: Rig, tuning: Tuning) -> list[
     ]
     if missing:
         raise OperatorError(
-            f"colours: no marker in any of {len(instants)} instants ({', '.join(missing)} not seen by two cameras at the "
-            "marker's sides); carry the vehicle upright through the room where two cameras see it, and check the "
+            f"colours: no marker in any of {len(instants)} instants ({', '.join(missing)} not seen by two cameras at "
+            "the marker's sides); carry the vehicle upright through the room where two cameras see it, and check the "
             "calibration and [[marker.balls]] position_mm, radius_mm"
         )
     return seen

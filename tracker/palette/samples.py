@@ -64,7 +64,7 @@ def vehicle_mask(shape: tuple[int, ...], seen: Sequence[BallPixels]) -> Image:
 
 
 def _centre(image: Image, uv_px: Array, radius_px: float) -> Array | None:
-    """Return the middle (2,) of what differs from its surroundings near a place; None at a border or if nothing does."""
+    """Return the middle (2,) of what differs from its surroundings at a place; None at a border or if nothing does."""
     half = int(np.ceil(PATCH_RADII * radius_px)) + 2
     u, v = (round(float(x)) for x in uv_px)
     height, width = image.shape[:2]

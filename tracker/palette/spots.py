@@ -37,7 +37,7 @@ def find_spots(image: Image, radius_px: float) -> Spots:
     colour = chroma(image)
     peaks: list[tuple[float, int, int, float]] = []
     smooth = {scale: _smooth(colour, max(0.5, 0.5 * scale * radius_px)) for scale in SCALES}
-    far = _smooth(colour, SURROUND * radius_px)
+    far = _surroundings(colour, SURROUND * radius_px)
     for scale, near in smooth.items():
         peaks += [(*peak, scale * radius_px) for peak in _peaks(near - far, scale * radius_px)]
     peaks.sort(reverse=True)
@@ -52,6 +52,12 @@ def find_spots(image: Image, radius_px: float) -> Spots:
 
 def _smooth(colour: Plane, sigma_px: float) -> Plane:
     return np.asarray(cv2.GaussianBlur(colour, (0, 0), sigma_px), dtype=np.float32)
+
+
+def _surroundings(colour: Plane, sigma_px: float) -> Plane:
+    """Return what a wide Gaussian would, by two boxes of width w, each of variance (w^2 - 1) / 12."""
+    side = 2 * round(math.sqrt(6.0 * sigma_px**2 + 1.0) / 2.0) + 1
+    return np.asarray(cv2.blur(cv2.blur(colour, (side, side)), (side, side)), dtype=np.float32)
 
 
 def _peaks(contrast: Plane, radius_px: float) -> list[tuple[float, int, int]]:
