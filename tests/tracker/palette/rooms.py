@@ -65,7 +65,7 @@ def cast(instants: Sequence[Instant], casts: Casts) -> list[Instant]:
 
 
 def _cast(image: Image, gains: tuple[float, float, float]) -> Image:
-    return np.clip(np.rint(image * np.array(gains)), 0, 255).astype(np.uint8)
+    return np.asarray(np.clip(np.rint(image * np.array(gains)), 0, 255), dtype=np.uint8)
 
 
 def places(instants: Sequence[Instant], path: str = "figure8") -> Array:
