@@ -25,7 +25,9 @@ VALUE_SHARES = (0.4, 0.55, 0.75)
 SATURATION_FLOOR, VALUE_FLOOR = 0.15, 0.06  # below these a hue is noise
 GUARD = (4.0, 0.03, 0.03)  # hue [deg], saturation, value: what noise adds to a background pixel
 HUE_STEP_DEG = 2.0  # of 8-bit images
-FEW_PIXELS = 4  # of background in a box are none
+FEW_PIXELS = 20  # of background in a box: fewer weigh less and less
+STEP_COST = 0.1  # a step narrower must rid the box of a tenth of the background in it
+CUT_STEPS = 2  # what cutting off ball pixels counts for
 TOLERANCE_MAX_DEG = 90.0
 
 
@@ -117,17 +119,16 @@ def _free(gap: float) -> float:
 
 
 def _widest(paint: Paint, free: tuple[float, float], room: Array) -> Colour:
-    """Return the widest box with the least background in it."""
-    saturations = (*(share * paint.saturation for share in SATURATION_SHARES), *paint.cuts)
-    choices = itertools.product(
-        *(enumerate(each) for each in (MARGIN_SHARES, MARGIN_SHARES, saturations, VALUE_SHARES))
-    )
-    # By how many steps each is narrower than the widest.
+    """Return the box with the best trade of width against background: narrower by a step only where that pays."""
+    saturations = [(step, share * paint.saturation) for step, share in enumerate(SATURATION_SHARES)]
+    saturations += [(len(SATURATION_SHARES) + CUT_STEPS * k, least) for k, least in enumerate(paint.cuts, 1)]
+    margins, values = list(enumerate(MARGIN_SHARES)), list(enumerate(VALUE_SHARES))
+    choices = itertools.product(margins, margins, saturations, values)
     tried = [(sum(step for step, _ in one), _box(paint, free, *(value for _, value in one))) for one in choices]
     near = room[holds(tried[0][1], room, GUARD)]
     counts = [int(holds(box, near, GUARD).sum()) for _, box in tried]
-    allowed = max(FEW_PIXELS, round(1.1 * min(counts)))
-    return min((one for one, count in zip(tried, counts, strict=True) if count <= allowed), key=lambda one: one[0])[1]
+    costs = [math.log(count + FEW_PIXELS) + STEP_COST * steps for count, (steps, _) in zip(counts, tried, strict=True)]
+    return tried[int(np.argmin(costs))][1]
 
 
 def _box(
