@@ -26,7 +26,7 @@ SATURATION_FLOOR, VALUE_FLOOR = 0.15, 0.06  # below these a hue is noise
 GUARD = (4.0, 0.03, 0.03)  # hue [deg], saturation, value: what noise adds to a background pixel
 HUE_STEP_DEG = 2.0  # of 8-bit images
 FEW_PIXELS = 20  # of background in a box: fewer weigh less and less
-STEP_COST = 0.1  # a step narrower must rid the box of a tenth of the background in it
+STEP_COST = 0.1  # a step narrower must rid the box of a tenth of the background it can avoid
 CUT_STEPS = 2  # what cutting off ball pixels counts for
 TOLERANCE_MAX_DEG = 90.0
 
@@ -126,6 +126,7 @@ def _widest(paint: Paint, free: tuple[float, float], room: Array) -> Colour:
     choices = itertools.product(margins, margins, saturations, values)
     tried = [(sum(step for step, _ in one), _box(paint, free, *(value for _, value in one))) for one in choices]
     near = room[holds(tried[0][1], room, GUARD)]
+    near = near[~holds(tried[-1][1], near)]  # what even the narrowest holds no choice avoids
     counts = [int(holds(box, near, GUARD).sum()) for _, box in tried]
     costs = [math.log(count + FEW_PIXELS) + STEP_COST * steps for count, (steps, _) in zip(counts, tried, strict=True)]
     return tried[int(np.argmin(costs))][1]
