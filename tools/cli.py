@@ -19,6 +19,7 @@ from tools.request import Clocks, DemoRequest, ExportFormat, Pace, RunRequest
 from tracker.errors import OperatorError
 
 EXIT_PATH_NOT_HELD = 1
+EXIT_COLOURS_NOT_GOOD = 1
 EXIT_OPERATOR = 2
 EXIT_INTERRUPTED = 130
 STDOUT = Path("-")
@@ -184,6 +185,33 @@ def export(
         typer.echo(f"{report.count} estimates written to {out}", err=True)
     for loss in report.lost:
         typer.echo(f"posebridge: warning: {log}: {loss}", err=True)
+
+
+@app.command()
+def colours(
+    config: ConfigOption = "lab",
+    source: Annotated[
+        str, typer.Option(help="recording:DIR, video:A.mp4,B.mp4, camera:0,1 or sim:NAME.", metavar="URI")
+    ] = "camera:0,1",
+    frames: Annotated[int, typer.Option(help="Read at most so many frames of each camera.", metavar="N")] = 300,
+    picture: Annotated[
+        Path | None, typer.Option(help="Show here what would be detected, and what clashes.", metavar="FILE.png")
+    ] = None,
+    write: Annotated[
+        Path | None, typer.Option(help="Write a copy of the config with the learned colours.", metavar="FILE.toml")
+    ] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a config that exists.")] = False,
+    json: JsonOption = False,
+) -> None:
+    """Learn the balls' colours from footage and warn of things in the room that look like them.
+
+    Carry the vehicle slowly through the room meanwhile. Exit code 1 when the colours are not good to fly with.
+    """
+    from tools.colours.command import ColoursRequest, run_colours
+
+    request = ColoursRequest(config, source, frames, picture, write, overwrite, json)
+    if not run_colours(request, _clocks()).good:
+        raise typer.Exit(EXIT_COLOURS_NOT_GOOD)
 
 
 @bench.command()

@@ -1,0 +1,100 @@
+"""One `posebridge colours`: footage in; page, picture and config out."""
+
+from __future__ import annotations
+
+import sys
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+
+from bridge.settings import Settings, load_settings, shipped_configs
+from bridge.settings.tuning import tuning_of
+from tools.colours.footage import Gathering, gather
+from tools.colours.picture import draw_palette
+from tools.colours.report import to_json, to_text
+from tools.colours.verdict import Verdict, judge
+from tools.colours.write import check_target, recoloured, write_config
+from tools.open_source import open_source
+from tools.request import Clocks
+from tracker.errors import OperatorError
+from tracker.palette.learn import Palette, learn
+from tracker.rig import Rig
+
+LEAST_FRAMES, MOST_FRAMES = 10, 100_000
+
+
+@dataclass(frozen=True, slots=True)
+class ColoursRequest:
+    """One lesson. config: name or path.  frames: read at most, of each camera.  picture, write: files, None for none.
+
+    Raises:
+        OperatorError: fewer than 10 or more than 100,000 frames.
+    """
+
+    config: str
+    source: str
+    frames: int
+    picture: Path | None
+    write: Path | None
+    overwrite: bool
+    as_json: bool
+
+    def __post_init__(self) -> None:
+        if not LEAST_FRAMES <= self.frames <= MOST_FRAMES:
+            raise OperatorError(
+                f"--frames: {self.frames} frames must be {LEAST_FRAMES} to {MOST_FRAMES}; give a number within"
+            )
+
+
+def run_colours(request: ColoursRequest, clocks: Clocks) -> Verdict:
+    """Learn, show and write.
+
+    Raises:
+        OperatorError: bad input, or no marker in the footage.
+    """
+    if request.write is not None:
+        check_target(request.write, "--write", request.overwrite)
+    if request.picture is not None:
+        check_target(request.picture, "--picture", overwrite=True)
+    settings = load_settings(request.config)
+    rig, gathering = _watch(request, settings, clocks)
+    palette = learn(gathering.kept, rig, tuning_of(settings.tracker))
+    verdict = judge(palette)
+    if request.picture is not None:
+        draw_palette(palette, request.picture)
+    if request.write is not None:
+        _write(request.write, request.config, palette)
+    page = to_json(palette, verdict) if request.as_json else to_text(palette, verdict, request.source)
+    sys.stdout.write(page + "\n")
+    return verdict
+
+
+def _watch(request: ColoursRequest, settings: Settings, clocks: Clocks) -> tuple[Rig, Gathering]:
+    """Read the source."""
+    console = Console(stderr=True)
+    with ExitStack() as stack:
+        opened = open_source(request.source, settings, clocks)
+        stack.enter_context(opened.source)
+        for warning in opened.warnings:
+            console.print(f"posebridge: warning: {warning}", style="yellow", soft_wrap=True, highlight=False)
+        if opened.live:
+            said = f"watching {request.frames} frames of each camera: carry the vehicle slowly through the room"
+            console.print(f"posebridge: {said}", soft_wrap=True, highlight=False)
+        rig = opened.chosen.rig
+        sizes_px = tuple((camera.width_px, camera.height_px) for camera in rig.cameras)
+        gathering = gather(opened.source, sizes_px, request.frames)
+    if not gathering.kept:
+        raise OperatorError(
+            f"colours {request.source}: no instant with a picture of each of {len(sizes_px)} cameras, within 50 ms and "
+            "of the calibration's size; check that every camera gives frames"
+        )
+    return rig, gathering
+
+
+def _write(target: Path, config: str, palette: Palette) -> None:
+    path = shipped_configs().get(config, Path(config))
+    colours = {lesson.name: lesson.new for lesson in palette.balls}
+    text = path.read_text(encoding="utf-8")
+    write_config(target, recoloured(text, colours, path.resolve().parent, target.resolve().parent))

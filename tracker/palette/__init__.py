@@ -1,0 +1,1 @@
+"""What colours balls and room have, learned from footage before flight; the tracker itself needs none of it."""
