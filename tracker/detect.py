@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tracker.palette import Palette, palette_of
+from tracker.colour_table import ColourTable, colours_of
 from tracker.rig import Ball
 from tracker.spots import find_spots
 from tracker.types import Array, Image, frozen_array
@@ -54,18 +54,18 @@ def find_blobs(image: Image, region: Region | None, balls: tuple[Ball, ...], max
         height, width = image.shape[:2]
         region = Region(0, 0, width, height)
     blobs: list[list[Blob]] = [[] for _ in balls]
-    for ball, u, v, area in spots_in(image, region, palette_of(balls), max_area_px).tolist():
+    for ball, u, v, area in spots_in(image, region, colours_of(balls), max_area_px).tolist():
         blobs[int(ball)].append(Blob(frozen_array((u, v)), area))
     return blobs
 
 
-def spots_in(image: Image, region: Region, palette: Palette, max_area_px: float) -> Array:
-    """Find the blobs of each of a palette's colours, as plain numbers: some microseconds for a ball's surroundings.
+def spots_in(image: Image, region: Region, colours: ColourTable, max_area_px: float) -> Array:
+    """Find the blobs of each of the colours of a table, as plain numbers: some microseconds for a ball's surroundings.
 
     Args:
         image: (height, width, 3) BGR.
         region: where to look; it must lie within the image.
-        palette: the colours, from `tracker.palette.palette_of`.
+        colours: from `tracker.colour_table.colours_of`.
         max_area_px: larger blobs are no ball [px^2].
     Returns:
         (m, 4): index of the colour, centroid u and v in the whole image [px], area [px^2]; largest first.
@@ -82,8 +82,8 @@ def spots_in(image: Image, region: Region, palette: Palette, max_area_px: float)
         top,
         right,
         bottom,
-        palette.least_spread,
-        palette.lowest_spread,
-        palette.hues,
+        colours.least_spread,
+        colours.lowest_spread,
+        colours.hues,
         float(max_area_px),
     )

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.colour_table import FIXED_POINT, HUE_STEPS, LEVELS
 from tracker.compiled import compiled
-from tracker.palette import FIXED_POINT, HUE_STEPS, LEVELS
 from tracker.types import Array, Image
 
 MIN_AREA_PX = 4
@@ -184,7 +184,7 @@ def find_spots(
     Args:
         image: (height, width, 3) BGR.
         left, top, right, bottom: where to look, within the image; right and bottom exclusive.
-        least_spread, lowest_spread, hues: the colours, as in `tracker.palette.Palette`.
+        least_spread, lowest_spread, hues: the colours, as in `tracker.colour_table.ColourTable`.
         most_px: larger spots are none [px^2].
     Returns:
         (m, 4): index of the colour, centroid u and v in the whole image [px], area [px^2]; largest first.

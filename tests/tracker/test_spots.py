@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tests.tracker.paper_rig import paper_rig
+from tracker.colour_table import colours_of
 from tracker.detect import Region, spots_in
-from tracker.palette import palette_of
 from tracker.rig import Ball, Colour
 from tracker.spots import ASPECT_MAX, FILL_MIN, MIN_AREA_PX
 from tracker.types import Image
@@ -53,7 +53,7 @@ def random_image(rng: np.random.Generator, coarse: int) -> Image:
 
 def assert_same(image: Image, region: Region, balls: tuple[Ball, ...]) -> int:
     """Compare a region's spots with OpenCV's and return how many there are."""
-    found = spots_in(image, region, palette_of(balls), MOST_PX)
+    found = spots_in(image, region, colours_of(balls), MOST_PX)
     assert (np.diff(found[:, 3]) <= 0.0).all()
     for k, ball in enumerate(balls):
         ours = sorted((area, u, v) for _, u, v, area in found[found[:, 0] == k].tolist())
@@ -83,7 +83,7 @@ def test_regions_have_the_blobs_that_opencv_finds_in_them_however_they_are_cut()
 
 def test_every_colour_there_is_counts_as_it_does_in_hsv() -> None:
     green_red = np.stack(np.meshgrid(np.arange(256), np.arange(256), indexing="ij"), axis=-1).astype(np.uint8)
-    palette = palette_of(PAINTS)
+    palette = colours_of(PAINTS)
     for blue in range(0, 256, 5):
         image = np.concatenate((np.full((256, 256, 1), blue, np.uint8), green_red), axis=2)
         hue = cv2.cvtColor(image, cv2.COLOR_BGR2HSV)[..., 0]
@@ -95,10 +95,10 @@ def test_every_colour_there_is_counts_as_it_does_in_hsv() -> None:
 
 def test_an_empty_region_has_no_spots_and_one_beyond_the_image_is_refused() -> None:
     image = random_image(np.random.default_rng(0), 5)
-    assert len(spots_in(image, Region(7, 7, 7, 9), palette_of(BALLS), MOST_PX)) == 0
+    assert len(spots_in(image, Region(7, 7, 7, 9), colours_of(BALLS), MOST_PX)) == 0
     for beyond in (Region(-1, 0, 5, 5), Region(0, 0, 321, 5), Region(0, 230, 5, 241), Region(9, 0, 5, 5)):
         with pytest.raises(ValueError, match="beyond an image of 320 x 240 px"):
-            spots_in(image, beyond, palette_of(BALLS), MOST_PX)
+            spots_in(image, beyond, colours_of(BALLS), MOST_PX)
 
 
 def test_images_that_are_views_or_read_only_are_searched_as_they_are() -> None:
@@ -108,7 +108,7 @@ def test_images_that_are_views_or_read_only_are_searched_as_they_are() -> None:
     view = np.zeros((240, 640, 3), np.uint8)[:, ::2]
     view[:] = image
     whole = Region(0, 0, 320, 240)
-    expected = spots_in(image, whole, palette_of(BALLS), MOST_PX)
+    expected = spots_in(image, whole, colours_of(BALLS), MOST_PX)
     assert len(expected) > 10
-    assert np.array_equal(spots_in(frozen, whole, palette_of(BALLS), MOST_PX), expected)
-    assert np.array_equal(spots_in(view, whole, palette_of(BALLS), MOST_PX), expected)
+    assert np.array_equal(spots_in(frozen, whole, colours_of(BALLS), MOST_PX), expected)
+    assert np.array_equal(spots_in(view, whole, colours_of(BALLS), MOST_PX), expected)

@@ -9,11 +9,11 @@ import cv2
 import numpy as np
 
 from tools.colours.verdict import clash_line, shown_clashes
-from tracker.detect import colour_mask
 from tracker.errors import OperatorError
 from tracker.look import look_everywhere
 from tracker.palette.background import Clash
 from tracker.palette.learn import Palette, Seen
+from tracker.palette.mask import colour_mask
 from tracker.types import Array, Frame, Image
 
 Bgr = tuple[int, int, int]

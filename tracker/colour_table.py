@@ -17,7 +17,7 @@ NEVER = LEVELS  # a spread that no pixel has
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Palette:
+class ColourTable:
     """The colours of n balls, a row each, prepared for `tracker.detect`.
 
     A pixel has a colour when the spread between its largest and least channel is at least that of its largest
@@ -31,13 +31,13 @@ class Palette:
 
 
 @lru_cache(maxsize=64)
-def palette_of(balls: tuple[Ball, ...]) -> Palette:
+def colours_of(balls: tuple[Ball, ...]) -> ColourTable:
     """Return the tables of the balls' colours, made once for each tuple of balls."""
     least_spread = np.stack([_least_spread(ball.colour) for ball in balls])
-    palette = Palette(least_spread, least_spread.min(axis=0), np.stack([_hues(ball.colour) for ball in balls]))
-    for table in (palette.least_spread, palette.lowest_spread, palette.hues):
+    made = ColourTable(least_spread, least_spread.min(axis=0), np.stack([_hues(ball.colour) for ball in balls]))
+    for table in (made.least_spread, made.lowest_spread, made.hues):
         table.flags.writeable = False
-    return palette
+    return made
 
 
 def _least_spread(colour: Colour) -> NDArray[np.int16]:
