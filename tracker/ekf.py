@@ -128,7 +128,7 @@ def _left_out(sighting: BallSighting, rig: Rig, distance2: float, where: str) ->
 
 
 def _posterior(prior: State, best: Fit) -> State:
-    """Update the state by one linear step from the prior, with the slope at the likeliest state.
+    """Take the likeliest state, and the covariance of one linear step there from the prior, by filterpy.
 
     Source: exp(theta + d) = exp(theta) exp(J_r(theta) d), so the error about the new attitude is J_r d.
     """
@@ -136,7 +136,7 @@ def _posterior(prior: State, best: Fit) -> State:
     filter_ = ExtendedKalmanFilter(dim_x=len(best.P), dim_z=rows)
     filter_.P = best.P
     filter_.update(best.y[:, None], lambda _: best.H, lambda _: np.zeros((rows, 1)), R=best.R)
-    P, dx = filter_.P.copy(), filter_.x[:, 0]
+    P, dx = filter_.P.copy(), best.dx
     turned = so3.right_jacobian(dx[ATTITUDE])
     P[ATTITUDE] = turned @ P[ATTITUDE]
     P[:, ATTITUDE] = P[:, ATTITUDE] @ turned.T

@@ -9,6 +9,7 @@ import numpy as np
 from tracker import manoeuvre
 from tracker.batch import Batch
 from tracker.correction import TILT_ROWS, inverse_of, innovation_covariance, likeliest, log_likelihoods
+from tracker.gate import chi2_limit
 from tracker.measure import camera_table, marker_points
 from tracker.predict import Prediction
 from tracker.rig import Rig
@@ -18,6 +19,8 @@ from tracker.types import Array
 
 LEAST_OPEN_TURN_RAD = 0.01
 BEND_SHARE = 0.2  # of a sighting's sigma: less does not matter
+LEAST_DOUBT = 0.2  # of the pixels' own noise: less does not matter
+AGREED_PROBABILITY = 0.99
 SHORTEST_S = 1e-3  # a tilt measured twice within less tells no more
 
 
@@ -85,7 +88,27 @@ def fit(ahead: Prediction, batch: Batch, rig: Rig, *, adapt: bool = True) -> Fit
                 return None
     inverse = inverse_of(innovation_covariance(H[:n], P, R[:n, :n].copy()))
     u = inverse @ y[:n]
+    dx = _agreed(ahead, batch, rig, P, R, dx)
     return Fit(batch, dx, P, levels, y, H, R, u, inverse, float(y[:n] @ u))
+
+
+def _agreed(ahead: Prediction, batch: Batch, rig: Rig, P: Array, R: Array, dx: Array) -> Array:
+    """Return the error as it is when the clocks do agree, if the sightings bear that out; else dx.
+
+    While speed and offset are both unknown, all that two cameras know together would be thrown away; nearly always
+    they do show one instant. The covariance stays that of the doubt.
+    """
+    n = len(batch.z)
+    if float(np.trace(batch.doubt)) < LEAST_DOUBT * float(np.trace(batch.R)):
+        return dx
+    sure = R.copy()
+    sure[:n, :n] -= batch.doubt
+    agreed, y, H, _ = _solve(ahead, batch, rig, P, sure)
+    if not np.isfinite(agreed).all():
+        return dx
+    S = innovation_covariance(H[:n], P, sure[:n, :n].copy())
+    nis = float(y[:n] @ np.linalg.solve(S, y[:n]))
+    return agreed if nis <= chi2_limit(AGREED_PROBABILITY, n) else dx
 
 
 def _solve(ahead: Prediction, batch: Batch, rig: Rig, P: Array, R: Array) -> tuple[Array, Array, Array, Array]:
