@@ -23,7 +23,7 @@ SHARP = Appearance((Blur(0.25, 0.25), Blur(0.25, 0.25)))
 
 
 def look(image: Frame, expected: State) -> tuple[list[BallSighting], list[Rejected]]:
-    found = look_near([image], RIG, expected, SHARP, FLOOR_PX)
+    found = look_near([image], RIG, expected, SHARP)
     return [fitted.sighting for fitted in found.fitted], list(found.rejections)
 
 
