@@ -8,8 +8,7 @@ import numpy as np
 
 from tracker import manoeuvre
 from tracker.batch import Batch
-from tracker.correction import TILT_ROWS, inverse_of, innovation_covariance, likeliest, log_likelihoods
-from tracker.gate import chi2_limit
+from tracker.correction import TILT_ROWS, innovation_covariance, inverse_of, likeliest, log_likelihoods
 from tracker.measure import camera_table, marker_points
 from tracker.predict import Prediction
 from tracker.rig import Rig
@@ -20,7 +19,6 @@ from tracker.types import Array
 LEAST_OPEN_TURN_RAD = 0.01
 BEND_SHARE = 0.2  # of a sighting's sigma: less does not matter
 LEAST_DOUBT = 0.2  # of the pixels' own noise: less does not matter
-AGREED_PROBABILITY = 0.99
 SHORTEST_S = 1e-3  # a tilt measured twice within less tells no more
 
 
@@ -93,7 +91,7 @@ def fit(ahead: Prediction, batch: Batch, rig: Rig, *, adapt: bool = True) -> Fit
 
 
 def _agreed(ahead: Prediction, batch: Batch, rig: Rig, P: Array, R: Array, dx: Array) -> Array:
-    """Return the error as it is when the clocks do agree, if the sightings bear that out; else dx.
+    """Return the error as it is when the clocks do agree, if that makes the sightings likelier; else dx.
 
     While speed and offset are both unknown, all that two cameras know together would be thrown away; nearly always
     they do show one instant. The covariance stays that of the doubt.
@@ -107,8 +105,13 @@ def _agreed(ahead: Prediction, batch: Batch, rig: Rig, P: Array, R: Array, dx: A
     if not np.isfinite(agreed).all():
         return dx
     S = innovation_covariance(H[:n], P, sure[:n, :n].copy())
-    nis = float(y[:n] @ np.linalg.solve(S, y[:n]))
-    return agreed if nis <= chi2_limit(AGREED_PROBABILITY, n) else dx
+    doubtful = innovation_covariance(H[:n], P, R[:n, :n].copy())
+    return agreed if _log_likelihood(y[:n], S) > _log_likelihood(y[:n], doubtful) else dx
+
+
+def _log_likelihood(y: Array, S: Array) -> float:
+    """Return the log likelihood of innovations y (n,) of covariance S, up to a constant."""
+    return -0.5 * float(y @ np.linalg.solve(S, y) + np.linalg.slogdet(S)[1])
 
 
 def _solve(ahead: Prediction, batch: Batch, rig: Rig, P: Array, R: Array) -> tuple[Array, Array, Array, Array]:

@@ -4,8 +4,8 @@ A helicopter hovers for minutes and then pulls away within a frame. One sigma of
 both: too noisy in hover, too slow in the turn. So a few levels, from quiet to the envelope, are each asked how likely
 the new pixels are, before those pixels are used: the noise is right in the very round in which the manoeuvre begins.
 
-Source: a hidden Markov model over the levels, moment-matched to one Gaussian each round; the generalized pseudo-Bayesian
-    estimator of first order (Bar-Shalom, Li, Kirubarajan, 11.6.4) with the model's variance as the only difference.
+Source: a hidden Markov model over the levels, moment-matched to one Gaussian each round; the first-order
+    generalized pseudo-Bayesian estimator (Bar-Shalom, Li, Kirubarajan, 11.6.4) with the model's variance as the only difference.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ def later(levels: Array, dt: float) -> Array:
 
 
 def judged(levels: Array, log_likelihoods: Array) -> Array:
-    """Return the probabilities (2, LEVELS) after pixels whose log likelihoods (2, LEVELS) under each level are known."""
+    """Return the probabilities (2, LEVELS) after pixels of these log likelihoods (2, LEVELS) under each level."""
     weights = levels * np.exp(log_likelihoods - log_likelihoods.max(axis=1, keepdims=True))
     return np.asarray(weights / weights.sum(axis=1, keepdims=True))
 

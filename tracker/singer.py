@@ -82,9 +82,7 @@ def carried(mean: Array, dt: float, T: float, size: int) -> tuple[Array, Array]:
         F[i, 6 + i], F[i, 12 + i], F[6 + i, 12 + i], F[12 + i, 12 + i] = dt, place, speed, rest
         F[9 + i, 15 + i], F[15 + i, 15 + i] = speed, rest
         for j in range(3):
-            after[3 + 3 * i + j] = (
-                mean[3 + 3 * i] * E[0, j] + mean[4 + 3 * i] * E[1, j] + mean[5 + 3 * i] * E[2, j]
-            )
+            after[3 + 3 * i + j] = mean[3 + 3 * i] * E[0, j] + mean[4 + 3 * i] * E[1, j] + mean[5 + 3 * i] * E[2, j]
             F[3 + i, 3 + j] = E[j, i]
             F[3 + i, 9 + j] = J[i, j] * dt
             F[3 + i, 15 + j] = J[i, j] * place

@@ -24,9 +24,9 @@ from tracker import ekf
 from tracker.ekf import Update
 from tracker.measure import predicted_pixels
 from tracker.predict import Prediction, first_guess, predict
+from tracker.rig import Rig
 from tracker.singer import process_noise
 from tracker.state import State
-from tracker.rig import Rig
 from tracker.types import Array, BallSighting, Reason, Rejected, frozen_array
 
 RIG = ring_rig(2)
@@ -84,7 +84,12 @@ def test_a_ball_hidden_for_a_tenth_of_a_second_costs_millimetres_and_its_return_
         guess = perturbed(truth, drawn(rng, truth.P))
         for k in range(5):
             t_ns = (k + 1) * PERIOD_NS
-            truth = perturbed(at(truth, t_ns), drawn(rng, process_noise(19, PERIOD_NS * 1e-9, PROCESS.manoeuvre_s, 100.0, 1600.0) + 1e-18 * np.eye(19)))
+            truth = perturbed(
+                at(truth, t_ns),
+                drawn(
+                    rng, process_noise(19, PERIOD_NS * 1e-9, PROCESS.manoeuvre_s, 100.0, 1600.0) + 1e-18 * np.eye(19)
+                ),
+            )
             seen = sightings(truth, RIG, [(0, t_ns), (1, t_ns)], SIGMA_PX, rng)
             seen = tuple(s for s in seen if s.ball != 1 or k > 2)
             guess = updated(update(predict(guess, t_ns, PROCESS), seen, RIG, OPEN)).state
