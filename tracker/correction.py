@@ -149,16 +149,10 @@ def _linear(P: Array, H: Array, R: Array, y: Array, dx: Array, variances: Array)
     HP = np.zeros((m, n + 1))
     for i in range(m):
         for k in range(n):
-            if H[i, k] != 0.0:
-                for j in range(n):
-                    HP[i, j] += H[i, k] * P[k, j]
+            for j in range(n):
+                HP[i, j] += H[i, k] * P[k, j]
         HP[i, n] = y[i]
-    S = R.copy()
-    for i in range(m):
-        for j in range(i + 1):
-            for k in range(n):
-                S[i, j] += HP[i, k] * H[j, k]
-            S[j, i] = S[i, j]
+    S = innovation_covariance(H, P, R)
     white = forward(factor(S), HP)
     new, biggest = np.zeros(n), 0.0
     for j in range(n):
@@ -171,8 +165,8 @@ def _linear(P: Array, H: Array, R: Array, y: Array, dx: Array, variances: Array)
     return new, biggest
 
 
-@compiled("Tuple((f8[::1], f8[::1], f8[:, ::1], f8[::1]))(f8[::1], f8[:, ::1], f8, f8[::1], f8[:, ::1], i8[::1], i8[::1],"
-          " f8[::1], f8[:, ::1], f8[:, ::1])")  # fmt: skip
+@compiled("Tuple((f8[::1], f8[::1], f8[:, ::1], f8[::1]))(f8[::1], f8[:, ::1], f8, f8[::1], f8[:, ::1], i8[::1],"
+          " i8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")  # fmt: skip
 def likeliest(
     mean: Array, P: Array, T: float, z: Array, R: Array, cameras: Indices, balls: Indices, lags_s: Array,
     table: Array, points_inB: Array,

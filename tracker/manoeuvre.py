@@ -5,7 +5,7 @@ both: too noisy in hover, too slow in the turn. So a few levels, from quiet to t
 the new pixels are, before those pixels are used: the noise is right in the very round in which the manoeuvre begins.
 
 Source: a hidden Markov model over the levels, moment-matched to one Gaussian each round; the first-order
-    generalized pseudo-Bayesian estimator (Bar-Shalom, Li, Kirubarajan, 11.6.4) with the model's variance as the only difference.
+    generalized pseudo-Bayesian estimator (Bar-Shalom, Li, Kirubarajan, 11.6.4), whose models differ in variance only.
 """
 
 from __future__ import annotations

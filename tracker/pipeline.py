@@ -43,6 +43,7 @@ from tracker.types import (
 )
 
 RESETS = 256
+KNOWN_OFFSET_S = 0.001  # sigma: a clock offset known less well is found anew with a new track
 LEARN_ALL = 144  # balls; then
 LEARN_EVERY = 4  # rounds one ball
 
@@ -81,6 +82,8 @@ class Tracker:
     def step(self, event: Event) -> Step:
         """Take one event of the source and return what came of it."""
         harvest = _Harvest()
+        if isinstance(event, Frame) and 0 <= event.camera < len(self._rig.cameras):
+            event = replace(event, t_ns=event.t_ns + self._rig.cameras[event.camera].clock_offset_ns)
         if isinstance(event, Rejected):
             harvest.rejections.append(event)
         else:
@@ -212,6 +215,8 @@ class Tracker:
         last = self._history.newest
         if last is None:
             return start
+        if float(np.sqrt(np.diag(last.P)[OFFSETS:]).max()) > KNOWN_OFFSET_S:
+            return replace(start, noise=last.noise)
         P = start.P.copy()
         P[OFFSETS:, OFFSETS:] = last.P[OFFSETS:, OFFSETS:]
         return replace(start, P=P, offsets_s=last.offsets_s, noise=last.noise)

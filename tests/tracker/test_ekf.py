@@ -35,6 +35,7 @@ PERIOD_NS = 33_333_333
 OPEN = 1.0 - 1e-9  # a gate that lets every true sighting pass
 GATE = 0.999
 AT_FIRST_SIGHT = covariance(0.05, 0.3, 2.5, 1.6)
+NOISE = process_noise(19, PERIOD_NS * 1e-9, PROCESS.manoeuvre_s, 100.0, 1600.0) + 1e-18 * np.eye(19)
 FLYING = state(0, (0.2, -0.1, 0.1), (12.0, -8.0, 130.0), (1.0, -0.5, 0.3), (0.4, -0.8, 1.5))
 
 
@@ -86,9 +87,7 @@ def test_a_ball_hidden_for_a_tenth_of_a_second_costs_millimetres_and_its_return_
             t_ns = (k + 1) * PERIOD_NS
             truth = perturbed(
                 at(truth, t_ns),
-                drawn(
-                    rng, process_noise(19, PERIOD_NS * 1e-9, PROCESS.manoeuvre_s, 100.0, 1600.0) + 1e-18 * np.eye(19)
-                ),
+                drawn(rng, NOISE),
             )
             seen = sightings(truth, RIG, [(0, t_ns), (1, t_ns)], SIGMA_PX, rng)
             seen = tuple(s for s in seen if s.ball != 1 or k > 2)
