@@ -43,7 +43,6 @@ from tracker.types import (
 )
 
 RESETS = 256
-KNOWN_OFFSET_S = 0.001  # sigma: a clock offset known less well is found anew with a new track
 LEARN_ALL = 144  # balls; then
 LEARN_EVERY = 4  # rounds one ball
 
@@ -215,8 +214,6 @@ class Tracker:
         last = self._history.newest
         if last is None:
             return start
-        if float(np.sqrt(np.diag(last.P)[OFFSETS:]).max()) > KNOWN_OFFSET_S:
-            return replace(start, noise=last.noise)
         P = start.P.copy()
         P[OFFSETS:, OFFSETS:] = last.P[OFFSETS:, OFFSETS:]
         return replace(start, P=P, offsets_s=last.offsets_s, noise=last.noise)

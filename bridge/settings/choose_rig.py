@@ -56,7 +56,9 @@ def rig_of(settings: Settings, source_cameras: tuple[Camera, ...] | None, camera
             "name as many in --source as the rig has, or correct the config's [rig]"
         )
     offsets_ms = [camera.clock_offset_ms for camera in settings.rig.cameras] + [0.0] * len(cameras)
-    cameras = tuple(replace(c, clock_offset_ns=round(ms * 1e6)) for c, ms in zip(cameras, offsets_ms, strict=False))
+    cameras = tuple(
+        replace(c, clock_offset_ns=round(ms * 1e6)) if ms else c for c, ms in zip(cameras, offsets_ms, strict=False)
+    )
     return ChosenRig(make_rig(cameras, marker_of(settings.marker)), origin)
 
 
