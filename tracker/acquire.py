@@ -9,9 +9,11 @@ import numpy as np
 
 from tracker.associate import associate
 from tracker.detect import Blob
+from tracker.manoeuvre import start_levels
+from tracker.noise import start_noise
 from tracker.pose3 import pose
 from tracker.rig import Rig
-from tracker.state import ATTITUDE, POSITION, RATE, VELOCITY, Process, State
+from tracker.state import Process, State, start_covariance
 from tracker.triangulate import triangulate
 from tracker.types import Array, Frame, Point, Reason, Rejected
 
@@ -36,7 +38,7 @@ def first_state(seen: Seen, rig: Rig, process: Process) -> State | Rejected:
     newest_ns = max(times)
     if len(seen) < 2:
         return Rejected(Reason.NOT_FOUND, "one camera alone cannot start a track", newest_ns)
-    slack_m = (newest_ns - min(times)) * 1e-9 * process.initial_speed_m_s
+    slack_m = ((newest_ns - min(times)) * 1e-9 + process.clock_offset_s) * process.initial_speed_m_s
     points = [_places(ball, seen, rig, slack_m) for ball in range(len(rig.marker))]
     chosen = associate(points, rig.marker, slack_m)
     if isinstance(chosen, Rejected):
@@ -51,12 +53,18 @@ def first_state(seen: Seen, rig: Rig, process: Process) -> State | Rejected:
         if miss_m > slack_m + MISS_SIGMA * float(np.sqrt(np.trace(point.covariance))):
             detail = f"{ball.name} stands {miss_m * 1e3:.0f} mm from its place on the marker: mirrored or mistaken"
             return Rejected(Reason.GEOMETRY, detail, newest_ns)
-    sigma = np.empty(12)
-    sigma[POSITION] = START_POSITION_M + slack_m
-    sigma[ATTITUDE] = START_ATTITUDE_RAD
-    sigma[VELOCITY] = process.initial_speed_m_s
-    sigma[RATE] = process.initial_rate_rad_s
-    return State(newest_ns, p_BinW, R_BtoW, np.zeros(3), np.zeros(3), np.diag(sigma**2))
+    return State(
+        newest_ns,
+        p_BinW,
+        R_BtoW,
+        v_BinW=np.zeros(3),
+        w_BinB=np.zeros(3),
+        P=start_covariance(process, rig, START_POSITION_M + slack_m, START_ATTITUDE_RAD),
+        offsets_s=np.zeros(len(rig.cameras)),
+        levels=start_levels(),
+        noise=start_noise(len(rig.cameras), process.pixel_noise_px),
+        manoeuvre_s=process.manoeuvre_s,
+    )
 
 
 def _places(ball: int, seen: Seen, rig: Rig, slack_m: float) -> list[Point]:

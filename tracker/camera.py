@@ -23,6 +23,7 @@ class Camera:
     K: (3, 3) intrinsic matrix [px].
     distortion: (4,), (5,) or (8,) OpenCV order k1 k2 p1 p2 [k3 [k4 k5 k6]].
     R_CtoW: (3, 3), p_CinW: (3,) the camera's pose in the room [m].
+    clock_offset_ns: known time by which it sees later than its stamps say [ns].
     Build it with `make_camera`, which checks the values.
     """
 
@@ -33,6 +34,7 @@ class Camera:
     distortion: Array
     R_CtoW: Array
     p_CinW: Array
+    clock_offset_ns: int = 0
 
     def in_camera(self, p_inW: Array) -> Array:
         """Turn room points (n, 3) into camera coordinates (n, 3) [m]."""

@@ -16,7 +16,7 @@ from tracker.measure import predicted_pixels
 from tracker.patch import Expected
 from tracker.rig import Rig
 from tracker.state import ATTITUDE, POSITION, State
-from tracker.types import Array, BallSighting, Frame, Reason, Rejected, frozen_array
+from tracker.types import Array, BallSighting, Frame, Reason, Rejected
 
 REGION_SIGMA = 3.5
 REGION_MARGIN_PX = 3.0
@@ -42,16 +42,13 @@ class Look:
     rejections: tuple[Rejected, ...]
 
 
-def look_near(
-    frames: Sequence[Frame], rig: Rig, state: State, appearances: Sequence[Appearance], floor_px: float
-) -> Look:
+def look_near(frames: Sequence[Frame], rig: Rig, state: State, appearances: Sequence[Appearance]) -> Look:
     """Find each ball in each image, in the region where a state, with its covariance, expects it.
 
     Args:
         frames: of different cameras, at about one time.
         state: carried to about that time.
         appearances: how balls look to each camera of the rig.
-        floor_px: one sigma of what the fit cannot know, added to its covariance [px].
     """
     fitted: list[Fitted] = []
     rejections: list[Rejected] = []
@@ -64,8 +61,7 @@ def look_near(
             if isinstance(centre, Reason):
                 rejections.append(_rejected(centre, f"{rig.marker.balls[b].name} at {_at(what)}", frame))
             else:
-                cov_px = frozen_array(centre.cov_px + floor_px**2 * np.eye(2))
-                sighting = BallSighting(frame.camera, b, frame.t_ns, centre.uv_px, cov_px)
+                sighting = BallSighting(frame.camera, b, frame.t_ns, centre.uv_px, centre.cov_px)
                 fitted.append(Fitted(sighting, frame, what, centre))
     return Look(tuple(fitted), tuple(rejections))
 
@@ -75,7 +71,7 @@ def _expectations(
 ) -> Iterator[tuple[int, Expected | Rejected]]:
     """Yield for each ball of the marker where its colour is seen near its prediction, or why it is not."""
     camera = rig.cameras[frame.camera]
-    uv_px, H = predicted_pixels(state, camera, rig.marker, frame.t_ns)
+    uv_px, H = predicted_pixels(state, rig, frame.camera, frame.t_ns)
     depths = camera.in_camera(rig.marker.points_inB @ state.R_BtoW.T + state.p_BinW)[:, 2]
     spreads = H @ state.P @ H.transpose(0, 2, 1) + np.eye(2)
     speeds_px_s = H[:, :, POSITION] @ state.v_BinW + H[:, :, ATTITUDE] @ state.w_BinB

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -18,15 +18,16 @@ import numpy as np
 from tracker import so3
 from tracker.acquire import first_state
 from tracker.detect import Blob
-from tracker.ekf import Update, predict, update
+from tracker.ekf import Update, update
 from tracker.gate import chi2_limit
 from tracker.history import History
 from tracker.intake import Intake
 from tracker.look import Fitted, look_everywhere, look_near
+from tracker.predict import Prediction, first_guess, predict
 from tracker.rig import Rig
 from tracker.rivals import first_rivals
 from tracker.rounds import Rounds
-from tracker.state import State
+from tracker.state import OFFSETS, REPORTED, State
 from tracker.tuning import Tuning
 from tracker.types import (
     BallSighting,
@@ -79,6 +80,8 @@ class Tracker:
     def step(self, event: Event) -> Step:
         """Take one event of the source and return what came of it."""
         harvest = _Harvest()
+        if isinstance(event, Frame) and 0 <= event.camera < len(self._rig.cameras):
+            event = replace(event, t_ns=event.t_ns + self._rig.cameras[event.camera].clock_offset_ns)
         if isinstance(event, Rejected):
             harvest.rejections.append(event)
         else:
@@ -134,25 +137,23 @@ class Tracker:
                 result = again
         return result
 
-    def _ahead(self, t_ns: int) -> State:
+    def _ahead(self, t_ns: int) -> Prediction:
         """Return the newest state carried on to an instant; there is one while tracking."""
         newest = self._history.newest
         if newest is None:
             raise ValueError("nothing is tracked yet")
         return predict(newest, t_ns, self._tuning.process)
 
-    def _see(self, frames: Round, ahead: State, harvest: _Harvest, *, start: bool = False) -> Update | None:
+    def _see(self, frames: Round, ahead: Prediction, harvest: _Harvest, *, start: bool = False) -> Update | None:
         """Look where a predicted state expects the balls and update it, or return None.
 
         start: the state is a first guess, which every ball must bear out.
         """
-        look = look_near(
-            frames, self._rig, ahead, [rivals.best for rivals in self._rivals], self._tuning.pixel_noise_floor_px
-        )
+        look = look_near(frames, self._rig, ahead.state, [rivals.best for rivals in self._rivals])
         harvest.rejections += look.rejections
         result = self._update(ahead, tuple(one.sighting for one in look.fitted))
         if isinstance(result, Update) and start and not self._all_seen_twice(result):
-            result = Rejected(Reason.GEOMETRY, "not every ball fits in two cameras", ahead.t_ns)
+            result = Rejected(Reason.GEOMETRY, "not every ball fits in two cameras", ahead.state.t_ns)
         if isinstance(result, Rejected):
             harvest.rejections.append(result)
             return None
@@ -171,13 +172,13 @@ class Tracker:
             camera, image = self._rig.cameras[index], one.frame.image
             self._rivals[index] = self._rivals[index].learned(image, camera, one.expected, one.centre)
 
-    def _update(self, ahead: State, sightings: tuple[BallSighting, ...]) -> Update | Rejected:
+    def _update(self, ahead: Prediction, sightings: tuple[BallSighting, ...]) -> Update | Rejected:
         """Update a predicted state, unless it comes to lean as no vehicle does."""
         result = update(ahead, sightings, self._rig, self._tuning.gate_probability)
         if isinstance(result, Update) and (tilt := _tilt_rad(result.state)) > self._tuning.tilt_limit_rad:
             limit_deg = math.degrees(self._tuning.tilt_limit_rad)
             detail = f"the pose leans {math.degrees(tilt):.0f} deg, limit {limit_deg:.0f} deg: mirrored or mistaken"
-            return Rejected(Reason.GEOMETRY, detail, ahead.t_ns)
+            return Rejected(Reason.GEOMETRY, detail, ahead.state.t_ns)
         return result
 
     def _search(self, frames: Round, t_ns: int, harvest: _Harvest) -> Update | None:
@@ -190,11 +191,13 @@ class Tracker:
         if isinstance(start, Rejected):
             harvest.rejections.append(start)
             return None
-        found = self._see(tuple(frame for frame, _ in fresh.values()), start, harvest, start=True)
+        guess = first_guess(self._still_known(start), self._tuning.process)
+        together = tuple(frame for frame, _ in fresh.values())
+        found = self._see(together, guess, harvest, start=True)
         if found is None:
             return None
         for _ in range(max(rivals.lessons_due for rivals in self._rivals)):
-            found = self._see(tuple(frame for frame, _ in fresh.values()), start, _Harvest(), start=True) or found
+            found = self._see(together, guess, _Harvest(), start=True) or found
         before = self._history.newest
         if before is not None and self._jumped(before, found.state):
             self._resets = (self._resets + 1) % RESETS
@@ -208,11 +211,20 @@ class Tracker:
         cameras = [{s.camera for s in found.used if s.ball == ball} for ball in range(len(self._rig.marker))]
         return all(len(seen) >= 2 for seen in cameras)
 
+    def _still_known(self, start: State) -> State:
+        """Return a first guess with what the last track learned of the cameras: their noise and their clocks."""
+        last = self._history.newest
+        if last is None:
+            return start
+        P = start.P.copy()
+        P[OFFSETS:, OFFSETS:] = last.P[OFFSETS:, OFFSETS:]
+        return replace(start, P=P, offsets_s=last.offsets_s, noise=last.noise)
+
     def _jumped(self, before: State, found: State) -> bool:
         """Say whether a pose found again is none that the old track can have led to."""
         if not 0 <= found.t_ns - before.t_ns <= self._tuning.continuity_limit_ns:
             return True
-        ahead = predict(before, found.t_ns, self._tuning.process)
+        ahead = predict(before, found.t_ns, self._tuning.process).state
         error = np.concatenate((found.p_BinW - ahead.p_BinW, so3.log(ahead.R_BtoW.T @ found.R_BtoW)))
         distance2 = float(error @ np.linalg.solve((ahead.P + found.P)[:6, :6], error))
         return distance2 > chi2_limit(self._tuning.gate_probability, 6)
@@ -231,7 +243,9 @@ class Tracker:
             R_BtoW=frozen_array(state.R_BtoW),
             v_BinW=frozen_array(state.v_BinW),
             w_BinB=frozen_array(state.w_BinB),
-            covariance=frozen_array(state.P),
+            covariance=frozen_array(state.P[:REPORTED, :REPORTED]),
+            clock_offsets_s=frozen_array(state.offsets_s),
+            clock_sigmas_s=frozen_array(np.sqrt(np.append(0.0, np.diag(state.P)[OFFSETS:]))),
             state=self._track,
             reset_counter=self._resets,
             nis=found.nis,

@@ -1,24 +1,31 @@
-"""The vehicle's state, its error, and how both go on in time."""
+"""The vehicle's state and its error."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from tracker import so3
+from tracker.rig import Rig
 from tracker.types import Array
 
 POSITION, ATTITUDE, VELOCITY, RATE = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
+ACCELERATION, ANGULAR_ACCELERATION = slice(12, 15), slice(15, 18)
+OFFSETS = 18  # errors of the clock offsets of cameras 1, 2, ... begin here
+REPORTED = 12  # the first of the errors, which `Estimate.covariance` is of
 
 
 @dataclass(frozen=True, slots=True)
 class Process:
     """How briskly the vehicle manoeuvres, from its envelope and not from any recording.
 
-    acceleration_m_s2, angular_acceleration_rad_s2: one sigma of what a manoeuvre reaches on each axis.
+    acceleration_m_s2, angular_acceleration_rad_s2: one sigma of what the briskest manoeuvre reaches on each axis.
     manoeuvre_s: how long it keeps one acceleration.
     initial_speed_m_s, initial_rate_rad_s: one sigma at first sight, on each axis.
+    tilt_rad: one sigma of roll and of pitch over a whole flight.  tilt_s: how long the vehicle keeps one tilt.
+    clock_offset_s: one sigma of a camera's unknown clock offset against camera 0; 0 when there is none.
+    pixel_noise_px: one sigma of what a camera adds to its fits, until it is learned.
     """
 
     acceleration_m_s2: float
@@ -26,14 +33,24 @@ class Process:
     manoeuvre_s: float
     initial_speed_m_s: float
     initial_rate_rad_s: float
+    tilt_rad: float
+    tilt_s: float
+    clock_offset_s: float
+    pixel_noise_px: float
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
-    """Nominal state and covariance at t_ns.
+    """Nominal state, covariance, and what was learned of manoeuvres and pixels on the way, at t_ns.
 
-    p_BinW (3,) [m], R_BtoW (3, 3), v_BinW (3,) [m/s], w_BinB (3,) [rad/s]; P (12, 12) of the errors in the order
-    position (W), rotation vector (B, R = R_hat exp(theta)), velocity (W), rate (B).
+    p_BinW (3,) [m], R_BtoW (3, 3), v_BinW (3,) [m/s], w_BinB (3,) [rad/s]; P (n, n) of the errors in the order
+    position (W), rotation vector (B, R = R_hat exp(theta)), velocity (W), rate (B), acceleration (W), angular
+    acceleration (B), clock offsets of cameras 1, 2, ...; n = 17 + cameras.
+    a_BinW (3,) [m/s^2], alpha_BinB (3,) [rad/s^2].
+    offsets_s: (cameras,) a frame stamped t shows the vehicle at t + offset; camera 0's clock counts, so its is 0 [s].
+    levels: (2, levels) probability of each level of `manoeuvre`, for translation and for rotation.
+    noise: (cameras, 2) variance that a camera adds to each fit, and how much is known of it, see `noise`.
+    manoeuvre_s: how long an acceleration lasts [s].
     """
 
     t_ns: int
@@ -42,62 +59,60 @@ class State:
     v_BinW: Array
     w_BinB: Array
     P: Array
+    a_BinW: Array = field(default_factory=lambda: np.zeros(3))
+    alpha_BinB: Array = field(default_factory=lambda: np.zeros(3))
+    offsets_s: Array = field(default_factory=lambda: np.zeros(1))
+    levels: Array = field(default_factory=lambda: np.ones((2, 1)))
+    noise: Array = field(default_factory=lambda: np.zeros((1, 2)))
+    manoeuvre_s: float = 1.0
 
     def moved(self, dx: Array) -> State:
-        """Return the state with the error dx (12,) put in; the covariance stays as it is."""
-        return State(
-            self.t_ns,
-            self.p_BinW + dx[POSITION],
-            self.R_BtoW @ so3.exp(dx[ATTITUDE]),
-            self.v_BinW + dx[VELOCITY],
-            self.w_BinB + dx[RATE],
-            self.P,
+        """Return the state with the error dx (n,) put in; the covariance stays as it is."""
+        offsets_s = self.offsets_s.copy()
+        offsets_s[1:] += dx[OFFSETS:]
+        return replace(
+            self,
+            p_BinW=self.p_BinW + dx[POSITION],
+            R_BtoW=self.R_BtoW @ so3.exp(dx[ATTITUDE]),
+            v_BinW=self.v_BinW + dx[VELOCITY],
+            w_BinB=self.w_BinB + dx[RATE],
+            a_BinW=self.a_BinW + dx[ACCELERATION],
+            alpha_BinB=self.alpha_BinB + dx[ANGULAR_ACCELERATION],
+            offsets_s=offsets_s,
+        )
+
+    @property
+    def mean(self) -> Array:
+        """Return the nominal state as one vector, for compiled code: p, R by rows, v, w, a, alpha, offsets."""
+        return np.concatenate(
+            (
+                self.p_BinW, self.R_BtoW.reshape(9), self.v_BinW, self.w_BinB, self.a_BinW, self.alpha_BinB,
+                self.offsets_s,
+            )
+        )  # fmt: skip
+
+    def with_mean(self, mean: Array) -> State:
+        """Return the state with another nominal state, as `mean` gives it."""
+        return replace(
+            self,
+            p_BinW=mean[0:3],
+            R_BtoW=mean[3:12].reshape(3, 3),
+            v_BinW=mean[12:15],
+            w_BinB=mean[15:18],
+            a_BinW=mean[18:21],
+            alpha_BinB=mean[21:24],
+            offsets_s=mean[24:],
         )
 
 
-def transition(w_BinB: Array, dt: float) -> Array:
-    """Return F (12, 12), d error(t + dt) / d error(t), for constant velocity and constant body rate.
-
-    Source: R exp(theta) exp(w dt) = R exp(w dt) exp(exp(-w dt) theta), and
-        exp((w + d) dt) = exp(w dt) exp(J_r(w dt) d dt) to first order in theta and d.
-    """
-    F = np.eye(12)
-    F[POSITION, VELOCITY] = dt * np.eye(3)
-    turn = w_BinB * dt
-    F[ATTITUDE, ATTITUDE] = so3.exp(-turn)
-    F[ATTITUDE, RATE] = so3.right_jacobian(turn) * dt
-    return F
-
-
-def process_noise(process: Process, dt: float) -> Array:
-    """Return Q (12, 12) gathered over dt.
-
-    Source: white acceleration of spectral density q = a^2 T integrated once and twice (Bar-Shalom, Li, Kirubarajan,
-        "Estimation with Applications to Tracking and Navigation", 6.2.2), on every axis of both pairs; the same for
-        any split of dt, so frames of free-running cameras add up to what one long step gives.
-    """
-    Q = np.zeros((12, 12))
-    once, twice, thrice = dt, dt * dt / 2.0, dt**3 / 3.0
-    eye = np.eye(3)
-    for lower, upper, sigma in (
-        (POSITION, VELOCITY, process.acceleration_m_s2),
-        (ATTITUDE, RATE, process.angular_acceleration_rad_s2),
-    ):
-        q = sigma**2 * process.manoeuvre_s
-        Q[lower, lower] = q * thrice * eye
-        Q[lower, upper] = Q[upper, lower] = q * twice * eye
-        Q[upper, upper] = q * once * eye
-    return Q
-
-
-def coasted(state: State, t_ns: int) -> State:
-    """Return the nominal state at t_ns at constant velocity and body rate, covariance untouched."""
-    dt = (t_ns - state.t_ns) * 1e-9
-    return State(
-        t_ns,
-        state.p_BinW + dt * state.v_BinW,
-        state.R_BtoW @ so3.exp(dt * state.w_BinB),
-        state.v_BinW,
-        state.w_BinB,
-        state.P,
-    )
+def start_covariance(process: Process, rig: Rig, position_m: float, attitude_rad: float) -> Array:
+    """Return P (n, n) of a vehicle just found, of which only the pose is known."""
+    sigma = np.empty(OFFSETS + len(rig.cameras) - 1)
+    sigma[POSITION] = position_m
+    sigma[ATTITUDE] = attitude_rad
+    sigma[VELOCITY] = process.initial_speed_m_s
+    sigma[RATE] = process.initial_rate_rad_s
+    sigma[ACCELERATION] = process.acceleration_m_s2
+    sigma[ANGULAR_ACCELERATION] = process.angular_acceleration_rad_s2
+    sigma[OFFSETS:] = process.clock_offset_s
+    return np.diag(sigma**2)

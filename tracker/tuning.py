@@ -13,7 +13,6 @@ class Tuning:
 
     process: how the vehicle may manoeuvre.
     gate_probability: of a true sighting to pass each chi-square gate.
-    pixel_noise_floor_px: one sigma of what the ball's model leaves unexplained.
     sync_window_ns: frames this close in time are one instant.
     coast_limit_ns: without a sighting for longer the track is lost.
     tilt_limit_rad: no vehicle that flies leans further; a pose that does is a mistake, such as a mirrored marker.
@@ -22,7 +21,6 @@ class Tuning:
 
     process: Process
     gate_probability: float
-    pixel_noise_floor_px: float
     sync_window_ns: int
     coast_limit_ns: int
     continuity_limit_ns: int

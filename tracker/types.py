@@ -129,6 +129,8 @@ class Estimate:
     nis, nis_dof: normalised innovation squared of the last update and its degrees of freedom (0: no update).
     available_ns: stopwatch reading when the newest frame in it stood in memory [ns].
     stages_ns: stopwatch time each stage took for this estimate [ns].
+    clock_offsets_s, clock_sigmas_s: (cameras,) how much later than its stamp each camera saw, by camera 0's clock, and
+        one sigma of that [s]; empty when it is not estimated.
     """
 
     t_ns: int
@@ -143,6 +145,8 @@ class Estimate:
     nis_dof: int = 0
     available_ns: int = 0
     stages_ns: Mapping[str, int] = field(default_factory=lambda: MappingProxyType({}))
+    clock_offsets_s: Array = field(default_factory=lambda: frozen_array(()))
+    clock_sigmas_s: Array = field(default_factory=lambda: frozen_array(()))
 
 
 @dataclass(frozen=True, slots=True)

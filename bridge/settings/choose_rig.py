@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from pathlib import Path
 
@@ -55,6 +55,10 @@ def rig_of(settings: Settings, source_cameras: tuple[Camera, ...] | None, camera
             f"rig: {len(cameras)} cameras ({origin}) but the source has {camera_count}; "
             "name as many in --source as the rig has, or correct the config's [rig]"
         )
+    offsets_ms = [camera.clock_offset_ms for camera in settings.rig.cameras] + [0.0] * len(cameras)
+    cameras = tuple(
+        replace(c, clock_offset_ns=round(ms * 1e6)) if ms else c for c, ms in zip(cameras, offsets_ms, strict=False)
+    )
     return ChosenRig(make_rig(cameras, marker_of(settings.marker)), origin)
 
 

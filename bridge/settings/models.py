@@ -55,6 +55,7 @@ class CameraSettings(Section):
     exposure_ms: Positive | None = None
     latency_ms: Annotated[float, Strict(), Field(ge=0, le=1000)] | None = None
     lock: bool = True
+    clock_offset_ms: Annotated[float, Strict(), Field(ge=-1000, le=1000)] = 0.0
 
 
 class RigSettings(Section):
@@ -115,9 +116,11 @@ class ProcessSettings(Section):
 
     acceleration_m_s2: Positive = 10.0
     angular_acceleration_rad_s2: Positive = 40.0
-    manoeuvre_ms: Positive = 70.0
+    manoeuvre_ms: Positive = 200.0
     initial_speed_m_s: Positive = 2.5
     initial_rate_rad_s: Positive = 1.6
+    tilt_deg: Positive = 20.0
+    tilt_ms: Positive = 500.0
 
 
 class TrackerSettings(Section):
@@ -129,7 +132,8 @@ class TrackerSettings(Section):
     tilt_limit_deg: Annotated[float, Strict(), Field(gt=0, le=180)] = 60.0
     sync_window_ms: NotNegative = 4.0
     gate_probability: Annotated[float, Strict(), Field(gt=0, lt=1)] = 0.999
-    pixel_noise_floor_px: Positive = 0.05
+    pixel_noise_px: Positive = 0.1
+    clock_offset_sigma_ms: NotNegative = 20.0
     process: ProcessSettings = ProcessSettings()
 
 

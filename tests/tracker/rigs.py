@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tests.tracker.paper_rig import paper_camera, paper_rig
 from tracker import so3
+from tracker.manoeuvre import start_levels
+from tracker.noise import start_noise
 from tracker.rig import Ball, Marker, Rig, make_marker, make_rig
 from tracker.state import ATTITUDE, POSITION, RATE, VELOCITY, Process, State
 from tracker.tuning import Tuning
@@ -18,14 +21,17 @@ SECOND_NS = 1_000_000_000
 PROCESS = Process(
     acceleration_m_s2=10.0,
     angular_acceleration_rad_s2=40.0,
-    manoeuvre_s=0.07,
+    manoeuvre_s=0.2,
     initial_speed_m_s=2.5,
     initial_rate_rad_s=1.6,
+    tilt_rad=np.radians(20.0),
+    tilt_s=0.5,
+    clock_offset_s=0.02,
+    pixel_noise_px=0.1,
 )
 TUNING = Tuning(
     process=PROCESS,
     gate_probability=0.999,
-    pixel_noise_floor_px=0.1,
     sync_window_ns=4_000_000,
     coast_limit_ns=200_000_000,
     continuity_limit_ns=1_000_000_000,
@@ -62,19 +68,23 @@ def state(
         np.array(tuple(v_BinW)),
         np.array(tuple(w_BinB)),
         covariance(0.002, 0.02, 0.1, 0.5) if P is None else P,
+        offsets_s=np.zeros(2),
+        levels=start_levels(),
+        noise=start_noise(2, 0.0001),
+        manoeuvre_s=PROCESS.manoeuvre_s,
     )
 
 
 def covariance(position_m: float, attitude_rad: float, speed_m_s: float, rate_rad_s: float) -> Array:
-    """Return a diagonal (12, 12) of these sigmas."""
-    return np.diag(np.repeat([position_m, attitude_rad, speed_m_s, rate_rad_s], 3) ** 2)
+    """Return P (19, 19) for two cameras of these sigmas, with next to no acceleration and offset."""
+    return np.diag(np.append(np.repeat([position_m, attitude_rad, speed_m_s, rate_rad_s, 1e-6, 1e-6], 3), 1e-9) ** 2)
 
 
 def at(truth: State, t_ns: int) -> State:
     """Carry a state to t_ns at constant velocity and body rate, by scipy's rotations."""
     dt = (t_ns - truth.t_ns) * 1e-9
     turn = Rotation.from_rotvec(dt * truth.w_BinB).as_matrix()
-    return State(t_ns, truth.p_BinW + dt * truth.v_BinW, truth.R_BtoW @ turn, truth.v_BinW, truth.w_BinB, truth.P)
+    return replace(truth, t_ns=t_ns, p_BinW=truth.p_BinW + dt * truth.v_BinW, R_BtoW=truth.R_BtoW @ turn)
 
 
 def seen_px(truth: State, rig: Rig, camera: int, t_ns: int) -> Array:
@@ -107,12 +117,11 @@ def difference(truth: State, guess: State) -> Array:
 
 
 def perturbed(truth: State, error: Array) -> State:
-    """Put an error (12,) into a state, by scipy's rotations."""
-    return State(
-        truth.t_ns,
-        truth.p_BinW + error[POSITION],
-        truth.R_BtoW @ Rotation.from_rotvec(error[ATTITUDE]).as_matrix(),
-        truth.v_BinW + error[VELOCITY],
-        truth.w_BinB + error[RATE],
-        truth.P,
+    """Put an error, of which the first 12 count, into a state, by scipy's rotations."""
+    return replace(
+        truth,
+        p_BinW=truth.p_BinW + error[POSITION],
+        R_BtoW=truth.R_BtoW @ Rotation.from_rotvec(error[ATTITUDE]).as_matrix(),
+        v_BinW=truth.v_BinW + error[VELOCITY],
+        w_BinB=truth.w_BinB + error[RATE],
     )

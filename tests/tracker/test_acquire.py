@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -62,7 +64,7 @@ def test_its_covariance_covers_what_the_first_look_may_err_by() -> None:
     fast = state(SECOND_NS, (0.2, -0.1, 0.1), (12.0, -8.0, 130.0), (1.0, 1.0, -2.5), (1.5, 0.0, 1.5))
     found = started(first_state(seen(fast, rig, {0: SECOND_NS, 1: SECOND_NS}, 0.5), rig, PROCESS))
     error = difference(fast, found)
-    assert error @ np.linalg.solve(found.P, error) < 12.0
+    assert error @ np.linalg.solve(found.P[:12, :12], error) < 12.0
     assert np.linalg.eigvalsh(found.P).min() > 0.0
 
 
@@ -106,7 +108,7 @@ def test_rays_that_pass_each_other_are_no_ball() -> None:
     frame, blobs = whole[1]
     shift_px = np.array([40.0, 0.0])
     whole[1] = (frame, [[Blob(frozen_array(b.uv_px + shift_px), b.area_px) for b in each] for each in blobs])
-    found = first_state(whole, rig, PROCESS)
+    found = first_state(whole, rig, replace(PROCESS, clock_offset_s=0.0))
     assert isinstance(found, Rejected)
     assert found.reason is Reason.NOT_FOUND
 

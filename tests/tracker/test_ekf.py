@@ -6,10 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from scipy.optimize import least_squares
-from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from tests.tracker.rigs import (
@@ -24,9 +21,12 @@ from tests.tracker.rigs import (
     state,
 )
 from tracker import ekf
-from tracker.ekf import Update, predict, update
+from tracker.ekf import Update
 from tracker.measure import predicted_pixels
-from tracker.state import State, process_noise
+from tracker.predict import Prediction, first_guess, predict
+from tracker.rig import Rig
+from tracker.singer import process_noise
+from tracker.state import State
 from tracker.types import Array, BallSighting, Reason, Rejected, frozen_array
 
 RIG = ring_rig(2)
@@ -35,7 +35,15 @@ PERIOD_NS = 33_333_333
 OPEN = 1.0 - 1e-9  # a gate that lets every true sighting pass
 GATE = 0.999
 AT_FIRST_SIGHT = covariance(0.05, 0.3, 2.5, 1.6)
+NOISE = process_noise(19, PERIOD_NS * 1e-9, PROCESS.manoeuvre_s, 100.0, 1600.0) + 1e-18 * np.eye(19)
 FLYING = state(0, (0.2, -0.1, 0.1), (12.0, -8.0, 130.0), (1.0, -0.5, 0.3), (0.4, -0.8, 1.5))
+
+
+def update(
+    ahead: State | Prediction, seen: tuple[BallSighting, ...], rig: Rig, probability: float
+) -> Update | Rejected:
+    """Update a prediction, or a state that is taken for one."""
+    return ekf.update(first_guess(ahead, PROCESS) if isinstance(ahead, State) else ahead, seen, rig, probability)
 
 
 def updated(found: Update | Rejected) -> Update:
@@ -44,12 +52,12 @@ def updated(found: Update | Rejected) -> Update:
 
 
 def drawn(rng: np.random.Generator, P: Array) -> Array:
-    return np.asarray(np.linalg.cholesky(P) @ rng.normal(size=12))
+    return np.asarray(np.linalg.cholesky(P) @ rng.normal(size=len(P)))
 
 
 def nees(truth: State, found: State) -> float:
     error = difference(truth, found)
-    return float(error @ np.linalg.solve(found.P, error))
+    return float(error @ np.linalg.solve(found.P[:12, :12], error))
 
 
 def test_free_running_cameras_give_no_bias_at_full_speed() -> None:
@@ -77,7 +85,10 @@ def test_a_ball_hidden_for_a_tenth_of_a_second_costs_millimetres_and_its_return_
         guess = perturbed(truth, drawn(rng, truth.P))
         for k in range(5):
             t_ns = (k + 1) * PERIOD_NS
-            truth = perturbed(at(truth, t_ns), drawn(rng, process_noise(PROCESS, PERIOD_NS * 1e-9)))
+            truth = perturbed(
+                at(truth, t_ns),
+                drawn(rng, NOISE),
+            )
             seen = sightings(truth, RIG, [(0, t_ns), (1, t_ns)], SIGMA_PX, rng)
             seen = tuple(s for s in seen if s.ball != 1 or k > 2)
             guess = updated(update(predict(guess, t_ns, PROCESS), seen, RIG, OPEN)).state
@@ -182,7 +193,7 @@ def test_the_iterated_update_beats_the_single_linear_step_for_a_poor_prior(seed:
 
 def single_step(start: State, seen: tuple[BallSighting, ...]) -> State:
     """Update by the textbook's linear step."""
-    predicted = [predicted_pixels(start, RIG.cameras[s.camera], RIG.marker, s.t_ns) for s in seen]
+    predicted = [predicted_pixels(start, RIG, s.camera, s.t_ns) for s in seen]
     z = np.concatenate([s.uv_px for s in seen])
     h = np.concatenate([uv_px[s.ball] for s, (uv_px, _) in zip(seen, predicted, strict=True)])
     H = np.concatenate([slope[s.ball] for s, (_, slope) in zip(seen, predicted, strict=True)])
@@ -194,7 +205,8 @@ def single_step(start: State, seen: tuple[BallSighting, ...]) -> State:
 def test_the_update_is_the_most_likely_state_between_prior_and_pixels(seed: int) -> None:
     """Against scipy's own least squares: rough pixels, a prior surer of some turns than of others, 30 deg off."""
     rng = np.random.default_rng(seed)
-    P, sigma_px = np.diag(np.square([0.03, 0.03, 0.03, 0.04, 0.15, 0.3, 0.3, 0.3, 0.3, 0.5, 0.5, 0.5])), 8.0
+    sigmas = [0.03, 0.03, 0.03, 0.04, 0.15, 0.3, 0.3, 0.3, 0.3, 0.5, 0.5, 0.5]
+    P, sigma_px = np.diag(np.square([*sigmas, *[1e-6] * 7])), 8.0
     start = replace(perturbed(FLYING, 2.0 * drawn(rng, P)), P=P)
     seen = sightings(FLYING, RIG, [(0, 0), (1, 30_000_000)], sigma_px, rng)
     root = np.sqrt(np.diag(P))
@@ -204,40 +216,21 @@ def test_the_update_is_the_most_likely_state_between_prior_and_pixels(seed: int)
         pixels = [(s.uv_px - g.uv_px) / sigma_px for s, g in zip(seen, guess, strict=True)]
         return np.concatenate((scaled, *pixels))
 
-    likeliest = perturbed(start, least_squares(misfit, np.zeros(12), xtol=1e-12).x * root)
+    likeliest = perturbed(start, least_squares(misfit, np.zeros(19), xtol=1e-12).x * root)
     found = updated(update(start, seen, RIG, OPEN)).state
     off = difference(likeliest, found)
-    assert np.sqrt(off @ np.linalg.solve(found.P, off)) < 0.005
-
-
-VECTOR = st.tuples(st.floats(-0.5, 0.5), st.floats(-0.5, 0.5), st.floats(-0.5, 0.5)).map(np.array)
-
-
-@settings(max_examples=30)
-@given(VECTOR, st.integers(0, 1000))
-def test_the_attitudes_covariance_turns_with_the_attitude(theta: Array, seed: int) -> None:
-    """The error about exp(theta) of a small d beside theta, by finite differences."""
-    root = np.random.default_rng(seed).normal(size=(12, 12))
-    P = root @ root.T
-    after = ekf._posterior(state(), np.concatenate((np.zeros(3), theta, np.zeros(6))), P)
-    step, about = 1e-6, Rotation.from_rotvec(theta).inv()
-    G = np.eye(12)
-    for k, e in enumerate(np.eye(3)):
-        ahead, behind = ((about * Rotation.from_rotvec(theta + s * step * e)).as_rotvec() for s in (1, -1))
-        G[3:6, 3 + k] = (ahead - behind) / (2.0 * step)
-    assert np.allclose(after.P, G @ P @ G.T, atol=1e-6)
-    assert np.array_equal(after.P, after.P.T)
+    assert np.sqrt(off @ np.linalg.solve(found.P[:12, :12], off)) < 0.005
 
 
 def test_a_prediction_grows_by_the_process_and_moves_with_the_velocity() -> None:
-    ahead = predict(FLYING, SECOND_NS // 10, PROCESS)
+    ahead = predict(FLYING, SECOND_NS // 10, PROCESS).state
     assert np.allclose(difference(at(FLYING, SECOND_NS // 10), ahead), 0.0, atol=1e-12)
-    assert (np.diag(ahead.P) > np.diag(FLYING.P)).all()
+    assert (np.diag(ahead.P) > np.diag(FLYING.P))[:12].all()
     assert np.linalg.eigvalsh(ahead.P).min() > 0.0
 
 
 def test_predicting_no_further_changes_nothing() -> None:
-    same = predict(FLYING, FLYING.t_ns, PROCESS)
+    same = predict(FLYING, FLYING.t_ns, PROCESS).state
     assert np.array_equal(same.P, FLYING.P)
     assert np.array_equal(same.p_BinW, FLYING.p_BinW)
 

@@ -120,7 +120,7 @@ def pose_bounds(bounds: dict[Key, Array], rig: Rig, truth: GroundTruth) -> dict[
         keys = [key for key in bounds if key[0] == t_ns]
         if len(keys) >= 3:
             there = State(t_ns, truth.p_BinW[k], truth.R_BtoW[k], np.zeros(3), np.zeros(3), np.eye(12))
-            H = [predicted_pixels(there, camera, rig.marker, t_ns)[1] for camera in rig.cameras]
+            H = [predicted_pixels(there, rig, camera, t_ns)[1] for camera in range(len(rig.cameras))]
             J = np.stack([np.concatenate((H[c][b][:, POSITION], H[c][b][:, ATTITUDE]), axis=1) for _, c, b in keys])
             result[t_ns] = pose_bound(J, np.stack([bounds[key] for key in keys]))
     return result

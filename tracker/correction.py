@@ -1,0 +1,211 @@
+"""The inner loops of the filter's update, compiled: iterate to the likeliest state, weigh innovations."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tracker.compiled import compiled
+from tracker.measure import Indices, pixels
+from tracker.singer import unit_noise
+from tracker.so3_compiled import turn_into
+from tracker.types import Array
+
+MAX_ITERATIONS = 8
+CONVERGED_SIGMA = 0.02  # stop when the last step is this small against the posterior's own sigma
+TILT_ROWS = 2
+
+
+@compiled("f8[:, ::1](f8[:, ::1])")
+def factor(S: Array) -> Array:
+    """Return L (n, n), lower, with L L' = S; NaN where S is not positive definite."""
+    n = len(S)
+    L = np.zeros((n, n))
+    for i in range(n):
+        for j in range(i + 1):
+            rest = S[i, j]
+            for k in range(j):
+                rest -= L[i, k] * L[j, k]
+            L[i, j] = math.sqrt(rest) if i == j else rest / L[j, j]
+    return L
+
+
+@compiled("f8[:, ::1](f8[:, ::1], f8[:, ::1])")
+def forward(L: Array, B: Array) -> Array:
+    """Return L^-1 B (n, m)."""
+    X = B.copy()
+    for i in range(len(L)):
+        for k in range(i):
+            share = L[i, k]
+            for j in range(B.shape[1]):
+                X[i, j] -= share * X[k, j]
+        for j in range(B.shape[1]):
+            X[i, j] /= L[i, i]
+    return X
+
+
+@compiled("f8[:, ::1](f8[:, ::1], f8[:, ::1], f8[:, ::1])")
+def innovation_covariance(H: Array, P: Array, R: Array) -> Array:
+    """Return H P H' + R."""
+    m, n = H.shape
+    S, HP = R.copy(), np.zeros((m, n))
+    for i in range(m):
+        for k in range(n):
+            if H[i, k] != 0.0:
+                for j in range(n):
+                    HP[i, j] += H[i, k] * P[k, j]
+        for j in range(i + 1):
+            for k in range(n):
+                S[i, j] += HP[i, k] * H[j, k]
+            S[j, i] = S[i, j]
+    return S
+
+
+@compiled("f8[:, ::1](f8[:, ::1])")
+def inverse_of(S: Array) -> Array:
+    """Return the inverse of a covariance (n, n)."""
+    root = forward(factor(S), np.eye(len(S)))
+    inverse = np.zeros(S.shape)
+    for k in range(len(S)):
+        for i in range(k + 1):
+            for j in range(k + 1):
+                inverse[i, j] += root[k, i] * root[k, j]
+    return inverse
+
+
+@compiled("f8[:, ::1](f8[:, ::1], i8[::1], f8[::1], f8, i8)")
+def path_noise(H: Array, cameras: Indices, lags_s: Array, T: float, first: int) -> Array:
+    """Return the covariance (2n, 2n) [px^2] of what an unknown path adds between the state's time and the cameras'.
+
+    Args:
+        lags_s: (n,) of each sighting's true time after the state's.
+        first: error from which three are moved by an acceleration of variance 1: 0 for place, 3 for attitude.
+    """
+    n = len(cameras)
+    R = np.zeros((2 * n, 2 * n))
+    for s in range(n):
+        noise = unit_noise(abs(lags_s[s]), T)[0]
+        for r in range(n):
+            if cameras[r] == cameras[s] and noise > 0.0:
+                for k in range(2):
+                    for m in range(2):
+                        for i in range(first, first + 3):
+                            R[2 * s + k, 2 * r + m] += noise * H[2 * s + k, i] * H[2 * r + m, i]
+    return R
+
+
+@compiled("f8[:, ::1](f8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])")
+def log_likelihoods(y: Array, A: Array, B: Array, variances: Array, means: Array) -> Array:
+    """Return the log likelihoods (2, levels) of innovations y (n,) under S = A + s B[0] + r B[1], up to a constant.
+
+    Args:
+        B: (2, n, n) by a variance of 1 of translation and of rotation.
+        variances: (2, levels) tried of one, while the other has its mean.  means: (2,).
+    """
+    found = np.empty(variances.shape)
+    for k in range(2):
+        for i in range(variances.shape[1]):
+            L = factor(A + variances[k, i] * B[k] + means[1 - k] * B[1 - k])
+            white = forward(L, y.reshape(-1, 1))
+            total = 0.0
+            for j in range(len(y)):
+                total -= 0.5 * white[j, 0] ** 2 + math.log(L[j, j])
+            found[k, i] = total
+    return found
+
+
+@compiled("f8[::1](f8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")
+def _moved(mean: Array, dx: Array, E: Array, J_r: Array) -> Array:
+    """Return the mean with the error dx put in, and write exp and right Jacobian of its turn into E and J_r."""
+    now = mean.copy()
+    turn_into(dx[3], dx[4], dx[5], E, J_r)
+    for i in range(3):
+        now[i] += dx[i]
+        for j in range(3):
+            now[3 + 3 * i + j] = mean[3 + 3 * i] * E[0, j] + mean[4 + 3 * i] * E[1, j] + mean[5 + 3 * i] * E[2, j]
+    now[12:24] += dx[6:18]
+    now[25:] += dx[18:]
+    return now
+
+
+@compiled("void(f8[::1], f8[:, ::1], f8[::1])")
+def _tilt(mean: Array, H: Array, y: Array) -> None:
+    """Write the two last rows: the room's vertical, seen in B, has no part along x and y when level.
+
+    Source: R' z has the components of R's last row r; turned by theta it goes by [r]x theta.
+    """
+    rows = len(H)
+    r = mean[9:12]
+    y[rows - 2], y[rows - 1] = -r[0], -r[1]
+    H[rows - 2, 3], H[rows - 2, 4], H[rows - 2, 5] = 0.0, -r[2], r[1]
+    H[rows - 1, 3], H[rows - 1, 4], H[rows - 1, 5] = r[2], 0.0, -r[0]
+
+
+@compiled("Tuple((f8[::1], f8))(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1])")
+def _linear(P: Array, H: Array, R: Array, y: Array, dx: Array, variances: Array) -> tuple[Array, float]:
+    """Return P H' S^-1 y (size,) and its largest step from dx in posterior sigmas; write the posterior variances."""
+    m, n = H.shape
+    HP = np.zeros((m, n + 1))
+    for i in range(m):
+        for k in range(n):
+            for j in range(n):
+                HP[i, j] += H[i, k] * P[k, j]
+        HP[i, n] = y[i]
+    S = innovation_covariance(H, P, R)
+    white = forward(factor(S), HP)
+    new, biggest = np.zeros(n), 0.0
+    for j in range(n):
+        variances[j] = P[j, j]
+        for i in range(m):
+            new[j] += white[i, j] * white[i, n]
+            variances[j] -= white[i, j] ** 2
+        if variances[j] > 0.0:
+            biggest = max(biggest, abs(new[j] - dx[j]) / math.sqrt(variances[j]))
+    return new, biggest
+
+
+@compiled("Tuple((f8[::1], f8[::1], f8[:, ::1], f8[::1]))(f8[::1], f8[:, ::1], f8, f8[::1], f8[:, ::1], i8[::1],"
+          " i8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")  # fmt: skip
+def likeliest(
+    mean: Array, P: Array, T: float, z: Array, R: Array, cameras: Indices, balls: Indices, lags_s: Array,
+    table: Array, points_inB: Array,
+) -> tuple[Array, Array, Array, Array]:  # fmt: skip
+    """Iterate the update about the newest estimate until it stands.
+
+    Args:
+        mean, P: the prior, `State.mean` and (size, size).
+        z: (2n,) pixels.  R: (2n + 2, 2n + 2), the last two rows for the tilt, see `ekf`.
+        T, cameras, balls, lags_s, table, points_inB: as `pixels` takes them.
+    Returns:
+        dx (size,); innovation (2n + 2,) and H (2n + 2, size) there, for one linear update from the prior; the
+        posterior's variances (size,). NaN when a ball comes to lie behind a camera.
+    Source: iterated EKF, Bell and Cathey, IEEE Trans. Automatic Control 38 (1993): with H at the newest estimate and
+        dx its distance from the prior, the linear update's innovation is z - h + H dx (3). By the multiplicative
+        attitude, d/d dx = H diag(I, J_r(theta), I, ...) (4).
+    """
+    size, rows = len(P), len(R)
+    dx, y, variances = np.zeros(size), np.zeros(rows), np.zeros(size)
+    H = np.zeros((rows, size))
+    E, J_r = np.empty((3, 3)), np.empty((3, 3))
+    for _ in range(MAX_ITERATIONS):
+        now = _moved(mean, dx, E, J_r)
+        h, slope = pixels(now, T, cameras, balls, lags_s, table, points_inB)
+        if not np.isfinite(h).all():
+            dx[:] = math.nan
+            break
+        H[: rows - TILT_ROWS] = slope
+        _tilt(now, H, y)
+        for i in range(rows - TILT_ROWS):
+            y[i] = z[i] - h[i]
+        for i in range(rows):
+            a, b, c = H[i, 3], H[i, 4], H[i, 5]
+            for j in range(3):
+                H[i, 3 + j] = a * J_r[0, j] + b * J_r[1, j] + c * J_r[2, j]  # (4)
+            for j in range(size):
+                y[i] += H[i, j] * dx[j]  # (3)
+        new, biggest = _linear(P, H, R, y, dx, variances)
+        dx = new
+        if biggest < CONVERGED_SIGMA:
+            break
+    return dx, y, H, variances

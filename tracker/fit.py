@@ -1,0 +1,146 @@
+"""The likeliest state between a prediction and a batch of sightings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracker import manoeuvre
+from tracker.batch import Batch
+from tracker.correction import TILT_ROWS, innovation_covariance, inverse_of, likeliest, log_likelihoods
+from tracker.measure import camera_table, marker_points
+from tracker.predict import Prediction
+from tracker.rig import Rig
+from tracker.singer import process_noise
+from tracker.state import ATTITUDE, POSITION
+from tracker.types import Array
+
+LEAST_OPEN_TURN_RAD = 0.01
+BEND_SHARE = 0.2  # of a sighting's sigma: less does not matter
+LEAST_DOUBT = 0.2  # of the pixels' own noise: less does not matter
+SHORTEST_S = 1e-3  # a tilt measured twice within less tells no more
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """A fit of a batch: the error dx found, and what leads there from the prior by one linear update.
+
+    P: prior covariance with the manoeuvre's noise in it.  levels: of the manoeuvre, after these sightings.
+    y (2n + 2,), H, R: innovation, slope and covariance of the sightings, then of the tilt.
+    u, inverse: S^-1 y and S^-1 of the sightings.  nis: y' S^-1 y.
+    """
+
+    batch: Batch
+    dx: Array
+    P: Array
+    levels: Array
+    y: Array
+    H: Array
+    R: Array
+    u: Array
+    inverse: Array
+    nis: float
+
+    def gains(self) -> Array:
+        """Return by how much the sum of squares would fall without each sighting (n,).
+
+        Source: u_i' (S^-1_ii)^-1 u_i; Baarda, "A testing procedure for use in geodetic networks", 1968, for blocks.
+        """
+        n = len(self.u) // 2
+        u = self.u.reshape(n, 2)
+        blocks = np.stack([self.inverse[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] for i in range(n)])
+        return np.asarray((u * np.linalg.solve(blocks, u[:, :, None])[:, :, 0]).sum(axis=1))
+
+
+def fit(ahead: Prediction, batch: Batch, rig: Rig, *, adapt: bool = True) -> Fit | None:
+    """Fit a batch; None when the fit runs away.
+
+    adapt: let the batch itself tell how brisk the manoeuvre is.
+    Two balls do not show the turn about their line. Then roll and pitch, which stay within bounds over a flight, bound
+    it, and where its curvature shows, that goes into the noise and the fit is made again (`_bend`).
+    """
+    state, process = ahead.state, ahead.process
+    levels, of = state.levels, manoeuvre.variances(process)
+    if adapt and ahead.dt > 0.0:
+        means = np.array(manoeuvre.expected(levels, of))
+        levels = manoeuvre.judged(levels, log_likelihoods(batch.y, batch.A, batch.B, of, means))
+    translation, rotation = manoeuvre.expected(levels, of)
+    P = ahead.P_coasted + process_noise(len(state.P), ahead.dt, process.manoeuvre_s, translation, rotation)
+    n = len(batch.z)
+    R = np.zeros((n + TILT_ROWS, n + TILT_ROWS))
+    R[:n, :n] = batch.R + batch.doubt + translation * batch.path[0] + rotation * batch.path[1]
+    # A tilt that lasts, as white noise of the same spectral density.
+    R[range(n, n + TILT_ROWS), range(n, n + TILT_ROWS)] = (
+        2.0 * process.tilt_rad**2 * process.tilt_s / max(ahead.dt, SHORTEST_S)
+    )
+    dx, y, H, variances = _solve(ahead, batch, rig, P, R)
+    if not np.isfinite(dx).all():
+        return None
+    if float(variances[ATTITUDE].max()) > LEAST_OPEN_TURN_RAD**2 / 3.0:
+        bend_px = _bend(ahead, batch, rig, dx, P, H, R)
+        if bend_px is not None:
+            R[:n, :n] += np.outer(bend_px, bend_px)
+            dx, y, H, variances = _solve(ahead, batch, rig, P, R)
+            if not np.isfinite(dx).all():
+                return None
+    inverse = inverse_of(innovation_covariance(H[:n], P, R[:n, :n].copy()))
+    u = inverse @ y[:n]
+    dx = _agreed(ahead, batch, rig, P, R, dx)
+    return Fit(batch, dx, P, levels, y, H, R, u, inverse, float(y[:n] @ u))
+
+
+def _agreed(ahead: Prediction, batch: Batch, rig: Rig, P: Array, R: Array, dx: Array) -> Array:
+    """Return the error as it is when the clocks do agree, if that makes the sightings likelier; else dx.
+
+    While speed and offset are both unknown, all that two cameras know together would be thrown away; nearly always
+    they do show one instant. The covariance stays that of the doubt.
+    """
+    n = len(batch.z)
+    if float(np.trace(batch.doubt)) < LEAST_DOUBT * float(np.trace(batch.R)):
+        return dx
+    sure = R.copy()
+    sure[:n, :n] -= batch.doubt
+    agreed, y, H, _ = _solve(ahead, batch, rig, P, sure)
+    if not np.isfinite(agreed).all():
+        return dx
+    S = innovation_covariance(H[:n], P, sure[:n, :n].copy())
+    doubtful = innovation_covariance(H[:n], P, R[:n, :n].copy())
+    return agreed if _log_likelihood(y[:n], S) > _log_likelihood(y[:n], doubtful) else dx
+
+
+def _log_likelihood(y: Array, S: Array) -> float:
+    """Return the log likelihood of innovations y (n,) of covariance S, up to a constant."""
+    return -0.5 * float(y @ np.linalg.solve(S, y) + np.linalg.slogdet(S)[1])
+
+
+def _solve(ahead: Prediction, batch: Batch, rig: Rig, P: Array, R: Array) -> tuple[Array, Array, Array, Array]:
+    return likeliest(
+        ahead.state.mean, P, ahead.process.manoeuvre_s, batch.z, R, batch.cameras, batch.balls, batch.lags_s,
+        camera_table(rig), marker_points(rig),
+    )  # fmt: skip
+
+
+def _bend(ahead: Prediction, batch: Batch, rig: Rig, dx: Array, P: Array, H: Array, R: Array) -> Array | None:
+    """Return how far a turn that a fit left open bends the balls' paths from straight (2n,) [px], or None if little.
+
+    Linearised, a ball off that turn's axis moves square to its arm; truly it moves on a circle, which a filter that
+    believes its tangent takes for knowledge of the arm's direction.
+
+    Source: turned by phi about the unit axis e, the arm m goes to second order by phi^2/2 (e (e.m) - m). For phi
+        normal with variance s, E[phi^4] = 3 s^2, so the rms of that is sqrt(3)/2 s |...|, the mean counted in. s, e:
+        the largest eigenvalue of the attitude's covariance and its vector.
+    """
+    HP = H @ P
+    posterior = P[ATTITUDE, ATTITUDE] - HP[:, ATTITUDE].T @ np.linalg.solve(HP @ H.T + R, HP[:, ATTITUDE])
+    variances, axes = np.linalg.eigh(posterior)
+    largest, axis = float(variances[2]), axes[:, 2]
+    if largest < LEAST_OPEN_TURN_RAD**2:
+        return None
+    arms = rig.marker.points_inB
+    R_BtoW = ahead.state.moved(dx).R_BtoW
+    sag_inW = (arms @ np.outer(axis, axis) - arms) * (largest * np.sqrt(3.0) / 2.0) @ R_BtoW.T
+    n = len(batch.z)
+    J = H[:n, POSITION].reshape(-1, 2, 3)
+    bend_px = np.asarray((J @ sag_inW[batch.balls][:, :, None]).reshape(-1))
+    return bend_px if bool((np.abs(bend_px) > BEND_SHARE * np.sqrt(np.diag(R)[:n])).any()) else None
