@@ -52,6 +52,10 @@ class Fit:
         blocks = np.stack([self.inverse[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] for i in range(n)])
         return np.asarray((u * np.linalg.solve(blocks, u[:, :, None])[:, :, 0]).sum(axis=1))
 
+    def log_likelihood(self) -> float:
+        """Return the log likelihood of the innovations, up to a constant."""
+        return 0.5 * (float(np.linalg.slogdet(self.inverse)[1]) - self.nis)
+
 
 def fit(ahead: Prediction, batch: Batch, rig: Rig, *, adapt: bool = True) -> Fit | None:
     """Fit a batch; None when the fit runs away.
@@ -69,11 +73,33 @@ def fit(ahead: Prediction, batch: Batch, rig: Rig, *, adapt: bool = True) -> Fit
     P = ahead.P_coasted + process_noise(len(state.P), ahead.dt, process.manoeuvre_s, translation, rotation)
     n = len(batch.z)
     R = np.zeros((n + TILT_ROWS, n + TILT_ROWS))
-    R[:n, :n] = batch.R + batch.doubt + translation * batch.path[0] + rotation * batch.path[1]
+    R[:n, :n] = batch.R + translation * batch.path[0] + rotation * batch.path[1]
     # A tilt that lasts, as white noise of the same spectral density.
     R[range(n, n + TILT_ROWS), range(n, n + TILT_ROWS)] = (
         2.0 * process.tilt_rad**2 * process.tilt_s / max(ahead.dt, SHORTEST_S)
     )
+    agreed = _fitted(ahead, batch, rig, levels, P, R)
+    if float(np.trace(batch.doubt)) < LEAST_DOUBT * float(np.trace(R[:n, :n])):
+        return agreed
+    R[:n, :n] += batch.doubt
+    doubted = _fitted(ahead, batch, rig, levels, P, R)
+    return _likelier(agreed, doubted)
+
+
+def _likelier(agreed: Fit | None, doubted: Fit | None) -> Fit | None:
+    """Choose between a fit that takes the cameras' clocks to agree and one that leaves it open.
+
+    While speed and offset are both unknown, doubt would throw away all that two cameras know together; nearly always
+    they do show one instant, and where they do not, the rays to three moving balls miss each other.
+    """
+    if agreed is None or doubted is None:
+        return doubted or agreed
+    return agreed if agreed.log_likelihood() > doubted.log_likelihood() else doubted
+
+
+def _fitted(ahead: Prediction, batch: Batch, rig: Rig, levels: Array, P: Array, R: Array) -> Fit | None:
+    """Fit with a given prior covariance P and noise R, which is not kept; None when the fit runs away."""
+    n, R = len(batch.z), R.copy()
     dx, y, H, variances = _solve(ahead, batch, rig, P, R)
     if not np.isfinite(dx).all():
         return None
@@ -86,32 +112,7 @@ def fit(ahead: Prediction, batch: Batch, rig: Rig, *, adapt: bool = True) -> Fit
                 return None
     inverse = inverse_of(innovation_covariance(H[:n], P, R[:n, :n].copy()))
     u = inverse @ y[:n]
-    dx = _agreed(ahead, batch, rig, P, R, dx)
     return Fit(batch, dx, P, levels, y, H, R, u, inverse, float(y[:n] @ u))
-
-
-def _agreed(ahead: Prediction, batch: Batch, rig: Rig, P: Array, R: Array, dx: Array) -> Array:
-    """Return the error as it is when the clocks do agree, if that makes the sightings likelier; else dx.
-
-    While speed and offset are both unknown, all that two cameras know together would be thrown away; nearly always
-    they do show one instant. The covariance stays that of the doubt.
-    """
-    n = len(batch.z)
-    if float(np.trace(batch.doubt)) < LEAST_DOUBT * float(np.trace(batch.R)):
-        return dx
-    sure = R.copy()
-    sure[:n, :n] -= batch.doubt
-    agreed, y, H, _ = _solve(ahead, batch, rig, P, sure)
-    if not np.isfinite(agreed).all():
-        return dx
-    S = innovation_covariance(H[:n], P, sure[:n, :n].copy())
-    doubtful = innovation_covariance(H[:n], P, R[:n, :n].copy())
-    return agreed if _log_likelihood(y[:n], S) > _log_likelihood(y[:n], doubtful) else dx
-
-
-def _log_likelihood(y: Array, S: Array) -> float:
-    """Return the log likelihood of innovations y (n,) of covariance S, up to a constant."""
-    return -0.5 * float(y @ np.linalg.solve(S, y) + np.linalg.slogdet(S)[1])
 
 
 def _solve(ahead: Prediction, batch: Batch, rig: Rig, P: Array, R: Array) -> tuple[Array, Array, Array, Array]:
