@@ -206,6 +206,32 @@ def _doubt(squares: Array, channels: int, tukey: Array) -> None:
         tukey[i] = max(LEAST_WEIGHT, 1.0 - squares[i] / channels / (TUKEY**2 * scale))
 
 
+@compiled("f8[:, ::1](f8[:, ::1], Array(float32, 3, 'C', True), i8, i8, f8, f8, i8[:, ::1], i8, i8)")
+def _slopes_at(
+    pixels: Array,
+    fine: NDArray[np.float32],
+    per_px: int,
+    reach: int,
+    drawn_px: float,
+    radius_px: float,
+    places: NDArray[np.int64],
+    u_steps: int,
+    v_steps: int,
+) -> Array:
+    """Return the slopes (2, n) of the brightness, as fitted, by a centre on the grid [1/px]."""
+    count, p = pixels.shape[1], fine.shape[2]
+    value, by_u, by_v = np.empty((p, count)), np.empty((p, count)), np.empty((p, count))
+    model, weight = np.empty((p + PLANE, count)), pixels[TRUST] ** 2
+    factor, coefficients = np.empty((p + PLANE, p + PLANE)), np.empty((1, p + PLANE))
+    read(fine, per_px, reach, drawn_px, radius_px, u_steps, v_steps, places, pixels, value, by_u, by_v)
+    _fill(pixels, value, model)
+    _fit_linear(pixels, model, weight, factor, coefficients)
+    slopes = np.empty((2, count))
+    _slope(pixels, by_u, coefficients[0], slopes[0])
+    _slope(pixels, by_v, coefficients[0], slopes[1])
+    return slopes
+
+
 @compiled("f8(f8[:, ::1], Array(float32, 3, 'C', True), i8, i8, f8, f8, i8[:, ::1], i8, i8)")
 def _squares_at(
     pixels: Array,
@@ -329,3 +355,13 @@ def misfit_at(patch: Patch, ball: Expected, centre: tuple[float, float], group: 
     u, v = (round(c * n) for c in centre)
     pixels = patch.bright if bright else patch.colour
     return _squares_at(pixels, template.fine, n, template.reach, template.radius_px, ball.radius_px, places, u, v)
+
+
+def slopes_at(patch: Patch, ball: Expected, centre: tuple[float, float]) -> Array:
+    """Return the slopes (2, n) of a ball's brightness, as fitted, by a given centre from the patch's middle [1/px]."""
+    half, streak_px = extent_of(ball).half, ball.streak_px
+    template = template_for(ball.radius_px, ball.response.luma_px, ball.shades, half, streak_px)
+    n, places = template.per_px, places_along(streak_px, template.per_px)
+    u, v = (round(c * n) for c in centre)
+    drawn = template.fine, n, template.reach, template.radius_px
+    return _slopes_at(patch.bright, *drawn, ball.radius_px, places, u, v)

@@ -7,17 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from tracker.centre import Group, misfit_at
+from tracker.centre import Group, misfit_at, slopes_at
 from tracker.compiled import compiled
 from tracker.patch import LUMA, TRUST, Expected, Patch, Response, X, Y, extent_of
 from tracker.solve import eliminate
-from tracker.template import BLUR_STEP_PX, TERMS, Vector, every_term, places_along, read, template_for
+from tracker.template import BLUR_STEP_PX, GLOSS, TERMS, Vector, every_term, places_along, read, template_for
 from tracker.types import Array
 
 BLUR_MAX_PX = 1.5
 EXPOSURE_TRIAL_S, EXPOSURE_STEP_S, EXPOSURE_MAX_S = 0.001, 0.00025, 0.02
 LEAST_STREAK_PX = 0.2  # a trial that moves the ball's ends by less shows nothing
-PLANE = 3
+PLANE, OTHERS = 3, 6  # of the background; with the centre's two, and the gloss, whose share differs by paint
 
 
 def sharper(patch: Patch, ball: Expected, centre: tuple[float, float], step_px: float) -> Response:
@@ -56,24 +56,28 @@ def _stepped(now_px: float, less: bool, step_px: float) -> float:
     return min(BLUR_MAX_PX, max(0.0, now_px + (-step_px if less else step_px)))
 
 
-@compiled("void(f8[:, ::1], f8[:, ::1], f8[:, ::1])")
-def _without_room(pixels: Array, terms: Array, products: Array) -> None:
-    """Fill in the products of terms and brightness (m, m), m = PLANE + TERMS + 1, with the background taken out.
+@compiled("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
+def _without_others(pixels: Array, terms: Array, slopes: Array, products: Array) -> None:
+    """Fill in the products of terms and brightness (m, m), m = OTHERS + TERMS + 1, without what is each ball's own.
 
-    terms: (TERMS, n).  Their products stand after the PLANE first rows, the brightness's last, lower triangle.
+    That is the background, the gloss, and where exactly its centre is: light learned at a centre that the light
+    itself has pulled aside would never be put right.
+    terms: (TERMS + 1, n), the gloss last.  slopes: (2, n) by the centre.
+    The terms' products stand after the OTHERS first rows, the brightness's last, lower triangle.
     """
     row = np.empty(len(products))
     products[:] = 0.0
     for i in range(pixels.shape[1]):
         bare = 1.0 - terms[0, i]
         row[0], row[1], row[2] = bare, bare * pixels[X, i], bare * pixels[Y, i]
-        row[PLANE:-1] = terms[:, i]
+        row[PLANE], row[PLANE + 1], row[PLANE + 2] = slopes[0, i], slopes[1, i], terms[GLOSS, i]
+        row[OTHERS:-1] = terms[:GLOSS, i]
         row[-1] = pixels[LUMA, i]
         for j in range(len(row)):
             weighted = pixels[TRUST, i] ** 2 * row[j]
             for k in range(j + 1):
                 products[j, k] += weighted * row[k]
-    eliminate(products, PLANE)
+    eliminate(products, OTHERS)
 
 
 def light_on(patch: Patch, ball: Expected, centre: tuple[float, float], lamp: Vector) -> tuple[Array, Array] | None:
@@ -91,15 +95,15 @@ def light_on(patch: Patch, ball: Expected, centre: tuple[float, float], lamp: Ve
         ball.radius_px, ball.response.luma_px, every_term(lamp), extent_of(ball).half, ball.streak_px
     )
     n, pixels = template.per_px, patch.bright
-    value, by_u, by_v = (np.empty((TERMS, pixels.shape[1])) for _ in range(3))
+    value, by_u, by_v = (np.empty((TERMS + 1, pixels.shape[1])) for _ in range(3))
     u, v = (round(c * n) for c in centre)
     places = places_along(ball.streak_px, n)
     read(template.fine, n, template.reach, template.radius_px, ball.radius_px, u, v, places, pixels, value, by_u, by_v)
     terms = value + (centre[0] - u / n) * by_u + (centre[1] - v / n) * by_v
-    products = np.empty((PLANE + TERMS + 1, PLANE + TERMS + 1))
-    _without_room(pixels, terms, products)
-    lower = products[PLANE:-1, PLANE:-1]
-    information, target = np.tril(lower) + np.tril(lower, -1).T, products[-1, PLANE:-1]
+    products = np.empty((OTHERS + TERMS + 1, OTHERS + TERMS + 1))
+    _without_others(pixels, terms, slopes_at(patch, ball, centre), products)
+    lower = products[OTHERS:-1, OTHERS:-1]
+    information, target = np.tril(lower) + np.tril(lower, -1).T, products[-1, OTHERS:-1]
     even = np.linalg.solve(information[:4, :4] + 1e-9 * np.eye(4), target[:4])
     mean = float(even[0] + 2.0 / 3.0 * even[3])  # z is 2/3 on the mean over a disc
     return (information * mean**2, target * mean) if mean > 0.0 else None

@@ -12,14 +12,16 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tracker.template import TERMS, Shades, Vector
+from tracker.template import GLOSS, TERMS, Shades, Vector
 from tracker.types import Array
 
-FORGETTING = 0.98  # a ball: the light of about the last fifty counts
+FORGETTING = 0.99  # a ball: the light of about the last hundred counts
 FADED = 0.2  # what is left of what was learned under another gamma
 ENOUGH = 3  # balls until the light is trusted
 RIDGE = np.array([0.0, 0.05, 0.05, 0.05, 0.002, 0.002, 0.002])  # a lamp explains what it can, one-sided light the rest
 LAMP_STEPS = 32  # directions and weights are rounded to 1 / LAMP_STEPS, so that templates can be kept
+COVERAGE = (1.0,) + (0.0,) * TERMS
+MIRROR = (0.0,) * GLOSS + (1.0,)
 _UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -71,10 +73,11 @@ class Light:
         return float(x), float(y), float(z)
 
     def shades(self, R_RtoW: Array) -> Shades:
-        """Return the shapes of a ball seen along a ray: its coverage, and its coverage times the light."""
+        """Return the shapes of a ball seen along a ray: coverage, that times the light, the lamp's mirror image."""
         weights = np.concatenate((self.terms[:1], R_RtoW.T @ self.terms[1:4], R_RtoW.T @ self.terms[4:7]))
         rounded = np.round(weights / weights[0] * LAMP_STEPS) / LAMP_STEPS
-        return Shades(self.lamp_seen(R_RtoW), ((1.0,) + (0.0,) * (TERMS - 1), tuple(float(w) for w in rounded)))
+        matt = (*(float(w) for w in rounded), 0.0)
+        return Shades(self.lamp_seen(R_RtoW), (COVERAGE, matt, MIRROR))
 
 
 def ray_frame(bearing_inC: Array, R_CtoW: Array) -> Array:

@@ -2,8 +2,9 @@
 
 Seen from afar a matt sphere of image radius r is a disc whose brightness depends on its normal alone,
 n = (x, y, z) with x right, y down in units of r and z = sqrt(1 - x^2 - y^2) towards the camera. Its image is a sum of
-seven terms: 1, n, and n where the lamp reaches it (Lambert's law: max(0, n.L) = n.L there, 0 elsewhere). Lens and
-pixel blur each. Drawn once per radius, blur and light on a fine grid, the image at any sub-pixel place is a slice.
+seven matt terms: 1, n, and n where the lamp reaches it (Lambert's law: max(0, n.L) = n.L there, 0 elsewhere), and of
+the paint's gloss: the lamp's mirror image, so small that its place tells all. Lens and pixel blur each. Drawn once per
+radius, blur and light on a fine grid, the image at any sub-pixel place is a slice.
 """
 
 from __future__ import annotations
@@ -21,6 +22,9 @@ from tracker.types import Array
 
 TERMS = 7
 """1, x, y, z, and x, y, z again where the lamp shines."""
+GLOSS = TERMS
+"""The term after those: the lamp's mirror image."""
+GLOSS_EXPONENT = 32.0  # about that of satin paint; Blinn, "Models of light reflection", SIGGRAPH 1977
 MARGIN_PX = 3.5  # patch beyond the ball's edge
 STREAK_MAX_PX = 8.0  # longer motion blur is treated as this long
 RADIUS_STEP_PX = 0.1
@@ -33,14 +37,14 @@ Streak = tuple[float, float]
 class Shades:
     """How a ball is shaded, in the frame of its ray (x right, y down, z towards the camera).
 
-    lamp: unit vector to the lamp.  weights: for each shape its TERMS weights; the first shape is the coverage.
+    lamp: unit vector to the lamp.  weights: for each shape those of its terms; the first shape is the coverage.
     """
 
     lamp: Vector
     weights: tuple[tuple[float, ...], ...]
 
 
-_UNITS = tuple(tuple(float(i == j) for j in range(TERMS)) for i in range(TERMS))
+_UNITS = tuple(tuple(float(i == j) for j in range(TERMS + 1)) for i in range(TERMS + 1))
 FLAT = Shades((0.0, 0.0, 1.0), _UNITS[:4])
 """A matt ball under light not known: even, and linear in the normal."""
 
@@ -97,7 +101,9 @@ def _sharp(per_px: int, radius_px: float, border: int, lamp: Array, weights: Arr
     size = 2 * count + 1
     shapes = np.zeros((size, size, len(weights)), dtype=np.float32)
     step = 1.0 / (per_px * radius_px)
-    terms = np.empty(TERMS)
+    terms = np.empty(TERMS + 1)
+    half = lamp + np.array([0.0, 0.0, 1.0])
+    half /= max(np.sqrt(half @ half), 1e-3)
     for row in range(size):
         y = (row - count) * step
         for column in range(size):
@@ -113,9 +119,11 @@ def _sharp(per_px: int, radius_px: float, border: int, lamp: Array, weights: Arr
             lit = min(1.0, max(0.0, cosine / step + 0.5))
             for i in range(3):
                 terms[4 + i] = terms[1 + i] * lit
+            mirrored = half[0] * terms[1] + half[1] * terms[2] + half[2] * terms[3]
+            terms[GLOSS] = max(mirrored, 0.0) ** GLOSS_EXPONENT
             for k in range(len(weights)):
                 total = 0.0
-                for i in range(TERMS):
+                for i in range(TERMS + 1):
                     total += weights[k, i] * terms[i]
                 shapes[row, column, k] = total * disc
     return shapes
