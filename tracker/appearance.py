@@ -34,12 +34,11 @@ class Appearance:
     light: Light = field(default_factory=Light)
     shown: Light = field(default_factory=Light)
 
-    def shades(self, camera: Camera, bearing_inC: Array) -> Shades:
-        """Return how a ball is shaded that the camera sees along a bearing (3,)."""
+    def shades(self, camera: Camera, x: float, y: float) -> Shades:
+        """Return how a ball is shaded that the camera sees along the ray (x, y, 1)."""
         if not self.shown.count:
             return FLAT
-        x, y = (round(float(bearing_inC[i] / bearing_inC[2]) / BEARING_STEP_RAD) for i in (0, 1))
-        return _shades(self.shown, camera, x, y)
+        return _shades(self.shown, camera, round(x / BEARING_STEP_RAD), round(y / BEARING_STEP_RAD))
 
     def with_gamma(self, gamma: float) -> Appearance:
         """Return it under another gamma, its light ready to be learned anew."""
@@ -49,7 +48,8 @@ class Appearance:
 
     def expected_like(self, ball: Expected, camera: Camera, uv_px: Array) -> Expected:
         """Return what would be expected of a ball, seen at uv_px (2,), if it looked as is known here."""
-        shades = self.shades(camera, camera.bearings(uv_px[None])[0])
+        x, y, z = camera.bearings(uv_px[None])[0].tolist()
+        shades = self.shades(camera, x / z, y / z)
         place = float(uv_px[0]), float(uv_px[1])
         return replace(ball, uv_px=place, shades=shades, response=self.response)
 

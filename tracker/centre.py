@@ -264,7 +264,7 @@ def _squares_at(
     "void(f8[:, ::1], f8[:, ::1], Array(float32, 3, 'C', True), Array(float32, 3, 'C', True), i8, i8, f8, f8,"
     "i8[:, ::1], f8, f8, f8[::1])"
 )
-def _gauss_newton(
+def gauss_newton(
     bright: Array,
     colour: Array,
     luma: NDArray[np.float32],
@@ -335,7 +335,7 @@ def fit_centre(image: Image, ball: Expected) -> Centre | Reason:
     )
     n, places = luma.per_px, places_along(streak_px, luma.per_px)
     shapes = luma.fine, chroma.fine, n, luma.reach, luma.radius_px
-    _gauss_newton(patch.bright, patch.colour, *shapes, ball.radius_px, places, extent.du, extent.dv, fit)
+    gauss_newton(patch.bright, patch.colour, *shapes, ball.radius_px, places, extent.du, extent.dv, fit)
     du, dv, cov_uu, cov_uv, cov_vv, misfit = fit.tolist()
     if not math.hypot(du - extent.du, dv - extent.dv) <= MAX_SHIFT_PX:
         return Reason.NO_BALL

@@ -10,17 +10,16 @@ import numpy as np
 
 from tracker.appearance import Appearance
 from tracker.camera import Camera
-from tracker.centre import Centre, fit_centre
-from tracker.detect import Blob, find_blobs, region_around
+from tracker.centre import Centre
+from tracker.colour_table import colours_of
+from tracker.detect import Blob, find_blobs
 from tracker.measure import predicted_pixels
 from tracker.patch import Expected
 from tracker.rig import Rig
+from tracker.sight import Sight, find_ball
 from tracker.state import ATTITUDE, POSITION, State
-from tracker.types import Array, BallSighting, Frame, Reason, Rejected
+from tracker.types import BallSighting, Frame, Reason, Rejected
 
-REGION_SIGMA = 3.5
-REGION_MARGIN_PX = 3.0
-LEAST_AREA_SHARE, MOST_AREA_SHARE = 0.15, 4.0  # of the ball's expected disc
 NEAREST_M = 0.3  # a ball closer to a camera than this is not looked for
 
 
@@ -53,58 +52,39 @@ def look_near(frames: Sequence[Frame], rig: Rig, state: State, appearances: Sequ
     fitted: list[Fitted] = []
     rejections: list[Rejected] = []
     for frame in frames:
-        for b, what in _expectations(frame, rig, state, appearances[frame.camera]):
-            if isinstance(what, Rejected):
-                rejections.append(what)
-                continue
-            centre = fit_centre(frame.image, what)
-            if isinstance(centre, Reason):
-                rejections.append(_rejected(centre, f"{rig.marker.balls[b].name} at {_at(what)}", frame))
+        for b, found in _balls_of(frame, rig, state, appearances[frame.camera]):
+            if isinstance(found, Rejected):
+                rejections.append(found)
             else:
-                sighting = BallSighting(frame.camera, b, frame.t_ns, centre.uv_px, centre.cov_px)
-                fitted.append(Fitted(sighting, frame, what, centre))
+                sighting = BallSighting(frame.camera, b, frame.t_ns, found.centre.uv_px, found.centre.cov_px)
+                fitted.append(Fitted(sighting, frame, found.expected, found.centre))
     return Look(tuple(fitted), tuple(rejections))
 
 
-def _expectations(
-    frame: Frame, rig: Rig, state: State, appearance: Appearance
-) -> Iterator[tuple[int, Expected | Rejected]]:
-    """Yield for each ball of the marker where its colour is seen near its prediction, or why it is not."""
+def _balls_of(frame: Frame, rig: Rig, state: State, appearance: Appearance) -> Iterator[tuple[int, Sight | Rejected]]:
+    """Yield each ball of the marker as seen near its prediction, or why it is not."""
     camera = rig.cameras[frame.camera]
     uv_px, H = predicted_pixels(state, rig, frame.camera, frame.t_ns)
-    depths = camera.in_camera(rig.marker.points_inB @ state.R_BtoW.T + state.p_BinW)[:, 2]
+    points_inC = camera.in_camera(rig.marker.points_inB @ state.R_BtoW.T + state.p_BinW)
     spreads = H @ state.P @ H.transpose(0, 2, 1) + np.eye(2)
     speeds_px_s = H[:, :, POSITION] @ state.v_BinW + H[:, :, ATTITUDE] @ state.w_BinB
     for b, ball in enumerate(rig.marker.balls):
-        if not np.isfinite(uv_px[b]).all() or depths[b] < NEAREST_M:
-            yield b, _rejected(Reason.BEHIND, f"{ball.name} is not before the camera", frame)
+        x, y, depth_m = points_inC[b].tolist()
+        u, v = uv_px[b].tolist()
+        if not (math.isfinite(u) and math.isfinite(v) and depth_m >= NEAREST_M):
+            yield b, Rejected(Reason.BEHIND, f"{ball.name} is not before the camera", frame.t_ns, frame.camera)
             continue
-        radius_px = camera.focal_px * ball.radius_m / float(depths[b])
-        blob = _nearest_blob(frame, rig, b, uv_px[b], spreads[b], radius_px)
-        if isinstance(blob, Rejected):
-            yield b, blob
-            continue
-        u, v = blob.uv_px.tolist()
-        shades = appearance.shades(camera, camera.bearings(blob.uv_px[None])[0])
-        speed_px_s = float(speeds_px_s[b, 0]), float(speeds_px_s[b, 1])
-        yield b, Expected((u, v), radius_px, speed_px_s, shades, appearance.response)
-
-
-def _nearest_blob(frame: Frame, rig: Rig, b: int, uv_px: Array, S: Array, radius_px: float) -> Blob | Rejected:
-    """Find the blob of one ball's colour nearest uv_px (2,), whose prediction has covariance S (2, 2) [px^2]."""
-    ball = rig.marker.balls[b]
-    half = REGION_SIGMA * np.sqrt(np.diag(S)) + radius_px + REGION_MARGIN_PX
-    height_px, width_px = frame.image.shape[:2]
-    region = region_around(uv_px, half, width_px, height_px)
-    if region is None:
-        return _rejected(Reason.AT_BORDER, f"{ball.name} is out of view", frame)
-    area = math.pi * radius_px**2
-    blobs = find_blobs(frame.image, region, (ball,), MOST_AREA_SHARE * area)[0]
-    likely = [blob for blob in blobs if blob.area_px >= LEAST_AREA_SHARE * area]
-    if not likely:
-        return _rejected(Reason.NO_BALL, f"no {ball.name} where it is expected", frame)
-    inverse = np.linalg.inv(S)
-    return min(likely, key=lambda blob: float((blob.uv_px - uv_px) @ inverse @ (blob.uv_px - uv_px)))
+        (S_uu, S_uv), (_, S_vv) = spreads[b].tolist()
+        speed_u, speed_v = speeds_px_s[b].tolist()
+        found = find_ball(
+            frame.image, colours_of((ball,)), (u, v), (S_uu, S_uv, S_vv), camera.focal_px * ball.radius_m / depth_m,
+            (speed_u, speed_v), appearance.shades(camera, x / depth_m, y / depth_m), appearance.response,
+        )  # fmt: skip
+        if isinstance(found, Reason):
+            detail = f"no {ball.name} at ({u:.0f}, {v:.0f}) px, where it is expected"
+            yield b, Rejected(found, detail, frame.t_ns, frame.camera)
+        else:
+            yield b, found
 
 
 def look_everywhere(frame: Frame, camera: Camera, rig: Rig) -> list[list[Blob]]:
@@ -112,11 +92,3 @@ def look_everywhere(frame: Frame, camera: Camera, rig: Rig) -> list[list[Blob]]:
     largest = max(ball.radius_m for ball in rig.marker.balls)
     most_px = math.pi * (camera.focal_px * largest / NEAREST_M) ** 2
     return find_blobs(frame.image, None, rig.marker.balls, most_px)
-
-
-def _rejected(reason: Reason, detail: str, frame: Frame) -> Rejected:
-    return Rejected(reason, detail, frame.t_ns, frame.camera)
-
-
-def _at(ball: Expected) -> str:
-    return f"({ball.uv_px[0]:.0f}, {ball.uv_px[1]:.0f}) px"

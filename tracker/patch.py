@@ -94,10 +94,15 @@ class Extent:
     half: int
 
 
+def edge_of(radius_px: float, streak_px: Streak) -> float:
+    """Return how far a ball's image reaches from its middle [px]."""
+    return radius_px + min(math.hypot(*streak_px), STREAK_MAX_PX) / 2.0
+
+
 def extent_of(ball: Expected) -> Extent:
     """Return which pixels belong to a ball."""
     u, v = round(ball.uv_px[0]), round(ball.uv_px[1])
-    edge_px = ball.radius_px + min(math.hypot(*ball.streak_px), STREAK_MAX_PX) / 2.0
+    edge_px = edge_of(ball.radius_px, ball.streak_px)
     return Extent(u, v, ball.uv_px[0] - u, ball.uv_px[1] - v, edge_px, math.ceil(edge_px + MARGIN_PX))
 
 
@@ -174,8 +179,8 @@ def _whitening(
     scale[3] = b_over_a / (a * c)
 
 
-@compiled("i8(Array(uint8, 3, 'C', True), i8, i8, i8, i8, f8, f8, f8, f8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")
-def _cut_pixels(
+@compiled("Tuple((f8[:, ::1], f8[:, ::1]))(Array(uint8, 3, 'C', True), i8, i8, i8, i8, f8, f8, f8, f8[::1], f8[::1])")
+def cut_pixels(
     image: Image,
     u: int,
     v: int,
@@ -186,11 +191,10 @@ def _cut_pixels(
     edge_px: float,
     light: Array,
     trust: Array,
-    bright: Array,
-    colour: Array,
-) -> int:
-    """Cut out and whiten; (u, v) is the middle pixel, (du, dv) the ball's place from there. Returns the blocks."""
-    scale, count = np.zeros(4), 0
+) -> tuple[Array, Array]:
+    """Cut out and whiten; (u, v) is the middle pixel, (du, dv) the ball's place from there. See `Patch`."""
+    pixels = (2 * half + 1) ** 2
+    bright, colour, scale, count = np.empty((4, pixels)), np.empty((5, pixels)), np.zeros(4), 0
     _whitening(image, u, v, half, block, du, dv, edge_px + RING_PX, scale)
     for top in range(v - half + ((v - half) % block), v + half - block + 2, block):
         for left in range(u - half + ((u - half) % block), u + half - block + 2, block):
@@ -217,7 +221,7 @@ def _cut_pixels(
             colour[BLUE, count] = blue * scale[1]
             colour[RED, count] = red * scale[2] - blue * scale[3]
             count += 1
-    return count
+    return np.ascontiguousarray(bright[:, : count * block**2]), np.ascontiguousarray(colour[:, :count])
 
 
 def cut(image: Image, extent: Extent, response: Response) -> Patch:
@@ -226,11 +230,8 @@ def cut(image: Image, extent: Extent, response: Response) -> Patch:
     Light is undone of the camera's gamma, since ball and background mix as light; a pixel's trust falls as gamma
     spreads its noise. Brightness and colour are scaled by what the ring round the ball varies, in grey levels.
     """
-    e, pixels, block = extent, (2 * extent.half + 1) ** 2, response.block_px
-    bright, colour = np.empty((4, pixels)), np.empty((5, pixels))
-    light, trust = light_of(response.gamma), trust_of(response.gamma)
-    count = _cut_pixels(image, e.u, e.v, e.half, block, e.du, e.dv, e.edge_px, light, trust, bright, colour)
-    return Patch(np.ascontiguousarray(bright[:, : count * block**2]), np.ascontiguousarray(colour[:, :count]))
+    e, light, trust = extent, light_of(response.gamma), trust_of(response.gamma)
+    return Patch(*cut_pixels(image, e.u, e.v, e.half, response.block_px, e.du, e.dv, e.edge_px, light, trust))
 
 
 @compiled("f8(Array(uint8, 3, 'C', True), i8, i8, i8)")

@@ -25,7 +25,7 @@ TERMS = 7
 GLOSS = TERMS
 """The term after those: the lamp's mirror image."""
 GLOSS_EXPONENT = 32.0  # about that of satin paint; Blinn, "Models of light reflection", SIGGRAPH 1977
-MARGIN_PX = 3.5  # patch beyond the ball's edge
+MARGIN_PX = 2.5  # patch beyond the ball's edge
 STREAK_MAX_PX = 8.0  # longer motion blur is treated as this long
 RADIUS_STEP_PX = 0.1
 BLUR_STEP_PX = 0.05
