@@ -19,13 +19,13 @@ from tracker import so3
 from tracker.acquire import first_state
 from tracker.detect import Blob
 from tracker.ekf import Update, update
+from tracker.eyes import Eyes
 from tracker.gate import chi2_limit
 from tracker.history import History
 from tracker.intake import Intake
-from tracker.look import Fitted, look_everywhere, look_near
+from tracker.look import Look, look_everywhere
 from tracker.predict import Prediction, first_guess, predict
 from tracker.rig import Rig
-from tracker.rivals import first_rivals
 from tracker.rounds import Rounds
 from tracker.state import OFFSETS, REPORTED, State
 from tracker.tuning import Tuning
@@ -42,8 +42,6 @@ from tracker.types import (
 )
 
 RESETS = 256
-LEARN_ALL = 72  # balls; then
-LEARN_EVERY = 4  # rounds one ball
 
 Round = tuple[Frame, ...]
 
@@ -69,8 +67,7 @@ class Tracker:
         self._stopwatch = stopwatch
         self._intake = Intake(rig)
         self._rounds = Rounds(len(rig.cameras), tuning.sync_window_ns)
-        self._rivals = [first_rivals() for _ in rig.cameras]
-        self._turn = 0
+        self._eyes = Eyes(rig)
         self._history = History()
         self._whole: dict[int, tuple[Frame, list[list[Blob]]]] = {}
         self._track = TrackState.SEARCHING
@@ -127,7 +124,7 @@ class Tracker:
     def _follow(self, frames: Round, t_ns: int, harvest: _Harvest) -> Update | None:
         """Update the track with a round; a late one is put in where it belongs and what came after is done again."""
         later = self._history.back_to(t_ns)
-        result = self._see(frames, self._ahead(t_ns), harvest)
+        result = self._study(frames, self._ahead(t_ns), harvest)
         if result is not None:
             self._history.remember(result)
         for past in later:
@@ -149,28 +146,35 @@ class Tracker:
 
         start: the state is a first guess, which every ball must bear out.
         """
-        look = look_near(frames, self._rig, ahead.state, [rivals.best for rivals in self._rivals])
+        found, look = self._glance(frames, ahead, ahead.state, start)
+        if isinstance(found, Update) and not start and self._eyes.blind(ahead.state):
+            # Only now is known how fast the balls move, and so how their images are smeared: look again.
+            again, sharper = self._glance(frames, ahead, found.state, start)
+            found, look = (again, sharper) if isinstance(again, Update) else (found, look)
         harvest.rejections += look.rejections
-        result = self._update(ahead, tuple(one.sighting for one in look.fitted))
-        if isinstance(result, Update) and start and not self._all_seen_twice(result):
-            result = Rejected(Reason.GEOMETRY, "not every ball fits in two cameras", ahead.state.t_ns)
-        if isinstance(result, Rejected):
-            harvest.rejections.append(result)
+        if isinstance(found, Rejected):
+            harvest.rejections.append(found)
             return None
-        harvest.sightings += result.used
-        harvest.rejections += result.rejected
-        self._learn([one for one in look.fitted if one.sighting in result.used])
-        return result
+        harvest.sightings += found.used
+        harvest.rejections += found.rejected
+        blindly = self._eyes.blind(found.state)
+        self._eyes.learn([one for one in look.fitted if one.sighting in found.used], blindly=blindly)
+        return found
 
-    def _learn(self, fitted: list[Fitted]) -> None:
-        """Learn how balls look: from every one at first, then from one in turn every few rounds."""
-        self._turn += 1
-        if all(rivals.settled and rivals.best.light.count >= LEARN_ALL for rivals in self._rivals):
-            fitted = [fitted[self._turn // LEARN_EVERY % len(fitted)]] if self._turn % LEARN_EVERY == 0 else []
-        for one in fitted:
-            index = one.frame.camera
-            camera, image = self._rig.cameras[index], one.frame.image
-            self._rivals[index] = self._rivals[index].learned(image, camera, one.expected, one.centre)
+    def _glance(self, frames: Round, ahead: Prediction, expected: State, start: bool) -> tuple[Update | Rejected, Look]:
+        """Look where a state expects the balls, and update the prediction by them."""
+        look = self._eyes.look(frames, expected)
+        found = self._update(ahead, tuple(one.sighting for one in look.fitted))
+        if isinstance(found, Update) and start and not self._all_seen_twice(found):
+            found = Rejected(Reason.GEOMETRY, "not every ball fits in two cameras", ahead.state.t_ns)
+        return found, look
+
+    def _study(self, frames: Round, ahead: Prediction, harvest: _Harvest, *, start: bool = False) -> Update | None:
+        """See, and go over the same images again as long as it is hardly known how balls look."""
+        found = self._see(frames, ahead, harvest, start=start)
+        for _ in range(self._eyes.lessons_due if found is not None else 0):
+            found = self._see(frames, ahead, _Harvest(), start=start) or found
+        return found
 
     def _update(self, ahead: Prediction, sightings: tuple[BallSighting, ...]) -> Update | Rejected:
         """Update a predicted state, unless it comes to lean as no vehicle does."""
@@ -193,11 +197,9 @@ class Tracker:
             return None
         guess = first_guess(self._still_known(start), self._tuning.process)
         together = tuple(frame for frame, _ in fresh.values())
-        found = self._see(together, guess, harvest, start=True)
+        found = self._study(together, guess, harvest, start=True)
         if found is None:
             return None
-        for _ in range(max(rivals.lessons_due for rivals in self._rivals)):
-            found = self._see(together, guess, _Harvest(), start=True) or found
         before = self._history.newest
         if before is not None and self._jumped(before, found.state):
             self._resets = (self._resets + 1) % RESETS

@@ -1,0 +1,67 @@
+"""The cameras' eyes: they look for balls as they know them, and learn from those that were found."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from tracker.look import Fitted, Look, look_near
+from tracker.rig import Rig
+from tracker.rivals import first_rivals
+from tracker.state import RATE, VELOCITY, State
+from tracker.types import Frame
+
+LEARN_ALL = 72  # balls of each camera; then
+LEARN_EVERY = 4  # rounds one ball
+BLIND_PX = 0.5  # of the streak's sigma: how fast the balls move is not known
+LONG_STREAK_PX = 0.7  # an image smeared further than this, taken for a still one, teaches wrong
+
+
+class Eyes:
+    """What each camera of a rig knows of how balls look to it."""
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
+        self._rivals = [first_rivals() for _ in rig.cameras]
+        self._turn = 0
+        self._taught_blindly = False
+
+    @property
+    def lessons_due(self) -> int:
+        """Return how often the first images should be gone over again, since nothing else is known yet."""
+        return max(rivals.lessons_due for rivals in self._rivals)
+
+    def look(self, frames: Sequence[Frame], state: State) -> Look:
+        """Find each ball in each image where a state expects it."""
+        return look_near(frames, self._rig, state, [rivals.best for rivals in self._rivals])
+
+    def blind(self, state: State) -> bool:
+        """Say whether a state does not know how far the balls' images are smeared."""
+        marker, P = self._rig.marker, state.P
+        reach_m = float(np.linalg.norm(marker.points_inB - marker.points_inB.mean(axis=0), axis=1).max())
+        speed_m_s = math.sqrt(float(P[VELOCITY, VELOCITY].trace() + reach_m**2 * P[RATE, RATE].trace()) / 3.0)
+        for camera, rivals in zip(self._rig.cameras, self._rivals, strict=True):
+            distance_m = float(np.linalg.norm(state.p_BinW - camera.p_CinW))
+            if speed_m_s * rivals.best.response.exposure_s * camera.focal_px / distance_m > BLIND_PX:
+                return True
+        return False
+
+    def learn(self, fitted: Sequence[Fitted], *, blindly: bool) -> None:
+        """Learn how balls look: from every one at first, then from one in turn every few rounds.
+
+        blindly: how fast they moved was not known. It is better than nothing, and forgotten if they did move.
+        """
+        self._turn += 1
+        if self._taught_blindly and not blindly:
+            self._taught_blindly = False
+            if any(math.hypot(*one.expected.streak_px) > LONG_STREAK_PX for one in fitted):
+                self._rivals = [first_rivals() for _ in self._rig.cameras]
+        self._taught_blindly |= blindly and not all(rivals.settled for rivals in self._rivals)
+        if all(rivals.settled and rivals.best.light.count >= LEARN_ALL for rivals in self._rivals):
+            fitted = [fitted[self._turn // LEARN_EVERY % len(fitted)]] if self._turn % LEARN_EVERY == 0 else []
+        for one in fitted:
+            index = one.frame.camera
+            camera, image = self._rig.cameras[index], one.frame.image
+            self._rivals[index] = self._rivals[index].learned(image, camera, one.expected, one.centre)
