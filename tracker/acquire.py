@@ -20,6 +20,8 @@ from tracker.types import Array, Frame, Point, Reason, Rejected
 CENTROID_SIGMA_PX = 0.7  # of a colour blob's centroid, blur and shading included
 MISS_SIGMA = 4.0
 MAX_CANDIDATES = 8  # per ball and camera, largest first
+TRIGGERED_NS = 50_000  # stamps of two cameras this close come from one trigger
+TRIGGERED_S = 1e-4  # one sigma of what is left between their clocks
 START_POSITION_M, START_ATTITUDE_RAD = 0.05, 0.3  # broad against the first fit, narrow against the room
 
 Seen = Mapping[int, tuple[Frame, Sequence[Sequence[Blob]]]]
@@ -59,12 +61,25 @@ def first_state(seen: Seen, rig: Rig, process: Process) -> State | Rejected:
         R_BtoW,
         v_BinW=np.zeros(3),
         w_BinB=np.zeros(3),
-        P=start_covariance(process, rig, START_POSITION_M + slack_m, START_ATTITUDE_RAD),
+        P=start_covariance(process, _clock_sigmas(seen, rig, process), START_POSITION_M + slack_m, START_ATTITUDE_RAD),
         offsets_s=np.zeros(len(rig.cameras)),
         levels=start_levels(),
         noise=start_noise(len(rig.cameras), process.pixel_noise_px),
         manoeuvre_s=process.manoeuvre_s,
     )
+
+
+def _clock_sigmas(seen: Seen, rig: Rig, process: Process) -> Array:
+    """Return one sigma of the clock offset of each camera but the first [s].
+
+    Cameras that stamp the same instant to a few microseconds have one trigger and one clock between them.
+    """
+    stamps = {camera: frame.t_ns for camera, (frame, _) in seen.items()}
+    sigmas = np.full(len(rig.cameras) - 1, process.clock_offset_s)
+    for camera in range(1, len(rig.cameras)):
+        if camera in stamps and 0 in stamps and abs(stamps[camera] - stamps[0]) <= TRIGGERED_NS:
+            sigmas[camera - 1] = min(TRIGGERED_S, process.clock_offset_s)
+    return sigmas
 
 
 def _places(ball: int, seen: Seen, rig: Rig, slack_m: float) -> list[Point]:

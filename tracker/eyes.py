@@ -16,6 +16,7 @@ from tracker.types import Frame
 LEARN_ALL = 72  # balls of each camera; then
 LEARN_EVERY = 4  # rounds one ball
 BLIND_PX = 0.5  # of the streak's sigma: how fast the balls move is not known
+SMEAR_DOUBT = 0.1  # of an unknown smear: what it moves the centre of a shaded ball, one sigma
 LONG_STREAK_PX = 0.7  # an image smeared further than this, taken for a still one, teaches wrong
 
 
@@ -35,18 +36,26 @@ class Eyes:
 
     def look(self, frames: Sequence[Frame], state: State) -> Look:
         """Find each ball in each image where a state expects it."""
-        return look_near(frames, self._rig, state, [rivals.best for rivals in self._rivals])
+        look = look_near(frames, self._rig, state, [rivals.best for rivals in self._rivals])
+        doubt_px = SMEAR_DOUBT * self._streak_px(state)
+        return look.doubted(doubt_px) if doubt_px > SMEAR_DOUBT * BLIND_PX else look
 
     def blind(self, state: State) -> bool:
         """Say whether a state does not know how far the balls' images are smeared."""
+        return self._streak_px(state) > BLIND_PX
+
+    def _streak_px(self, state: State) -> float:
+        """Return one sigma of how far the balls' images may be smeared that the state does not know of [px]."""
         marker, P = self._rig.marker, state.P
         reach_m = float(np.linalg.norm(marker.points_inB - marker.points_inB.mean(axis=0), axis=1).max())
         speed_m_s = math.sqrt(float(P[VELOCITY, VELOCITY].trace() + reach_m**2 * P[RATE, RATE].trace()) / 3.0)
-        for camera, rivals in zip(self._rig.cameras, self._rivals, strict=True):
-            distance_m = float(np.linalg.norm(state.p_BinW - camera.p_CinW))
-            if speed_m_s * rivals.best.response.exposure_s * camera.focal_px / distance_m > BLIND_PX:
-                return True
-        return False
+        return max(
+            speed_m_s
+            * rivals.best.response.exposure_s
+            * camera.focal_px
+            / float(np.linalg.norm(state.p_BinW - camera.p_CinW))
+            for camera, rivals in zip(self._rig.cameras, self._rivals, strict=True)
+        )
 
     def learn(self, fitted: Sequence[Fitted], *, blindly: bool) -> None:
         """Learn how balls look: from every one at first, then from one in turn every few rounds.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from tracker.patch import Expected
 from tracker.rig import Rig
 from tracker.sight import Sight, find_ball
 from tracker.state import ATTITUDE, POSITION, State
-from tracker.types import BallSighting, Frame, Reason, Rejected
+from tracker.types import BallSighting, Frame, Reason, Rejected, frozen_array
 
 NEAREST_M = 0.3  # a ball closer to a camera than this is not looked for
 
@@ -39,6 +39,13 @@ class Look:
 
     fitted: tuple[Fitted, ...]
     rejections: tuple[Rejected, ...]
+
+    def doubted(self, sigma_px: float) -> Look:
+        """Return it with sightings that are less sure, by one sigma on each axis [px]."""
+        more = sigma_px**2 * np.eye(2)
+        doubted = (replace(one.sighting, cov_px=frozen_array(one.sighting.cov_px + more)) for one in self.fitted)
+        fitted = tuple(replace(one, sighting=sighting) for one, sighting in zip(self.fitted, doubted, strict=True))
+        return Look(fitted, self.rejections)
 
 
 def look_near(frames: Sequence[Frame], rig: Rig, state: State, appearances: Sequence[Appearance]) -> Look:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tracker import so3
-from tracker.rig import Rig
 from tracker.types import Array
 
 POSITION, ATTITUDE, VELOCITY, RATE = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
@@ -105,14 +104,17 @@ class State:
         )
 
 
-def start_covariance(process: Process, rig: Rig, position_m: float, attitude_rad: float) -> Array:
-    """Return P (n, n) of a vehicle just found, of which only the pose is known."""
-    sigma = np.empty(OFFSETS + len(rig.cameras) - 1)
+def start_covariance(process: Process, offsets_s: Array, position_m: float, attitude_rad: float) -> Array:
+    """Return P (n, n) of a vehicle just found, of which only the pose is known.
+
+    offsets_s: one sigma of the clock offset of each camera but the first.
+    """
+    sigma = np.empty(OFFSETS + len(offsets_s))
     sigma[POSITION] = position_m
     sigma[ATTITUDE] = attitude_rad
     sigma[VELOCITY] = process.initial_speed_m_s
     sigma[RATE] = process.initial_rate_rad_s
     sigma[ACCELERATION] = process.acceleration_m_s2
     sigma[ANGULAR_ACCELERATION] = process.angular_acceleration_rad_s2
-    sigma[OFFSETS:] = process.clock_offset_s
+    sigma[OFFSETS:] = offsets_s
     return np.diag(sigma**2)

@@ -26,7 +26,7 @@ GLOSS = TERMS
 """The term after those: the lamp's mirror image."""
 GLOSS_EXPONENT = 32.0  # about that of satin paint; Blinn, "Models of light reflection", SIGGRAPH 1977
 MARGIN_PX = 2.5  # patch beyond the ball's edge
-STREAK_MAX_PX = 8.0  # longer motion blur is treated as this long
+STREAK_MAX_PX = 12.0  # longer motion blur is treated as this long
 RADIUS_STEP_PX = 0.1
 BLUR_STEP_PX = 0.05
 Vector = tuple[float, float, float]
