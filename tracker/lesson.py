@@ -15,13 +15,15 @@ from tracker.template import BLUR_STEP_PX, GLOSS, TERMS, Vector, every_term, pla
 from tracker.types import Array
 
 BLUR_MAX_PX = 1.5
-EXPOSURE_TRIAL_S, EXPOSURE_STEP_S, EXPOSURE_MAX_S = 0.001, 0.00025, 0.02
+EXPOSURE_TRIAL_S, EXPOSURE_MAX_S = 0.001, 0.02
+EXPOSURE_S_PX = 0.008  # step of exposure for one of blur [s/px]
 LEAST_STREAK_PX = 0.2  # a trial that moves the ball's ends by less shows nothing
+SMEARED_PX = 2.0  # a streak so long hides the blur
 PLANE, OTHERS = 3, 6  # of the background; with the centre's two, and the gloss, whose share differs by paint
 
 
 def sharper(patch: Patch, ball: Expected, centre: tuple[float, float], step_px: float) -> Response:
-    """Return the camera's response, its blurs and exposure moved one step to where the ball fits better.
+    """Return the camera's response, its blurs and its exposure moved one step to where the ball fits better.
 
     Args:
         patch: the ball's.
@@ -33,27 +35,27 @@ def sharper(patch: Patch, ball: Expected, centre: tuple[float, float], step_px: 
         changed = replace(ball, response=replace(now, **change))
         return misfit_at(patch, changed, centre, group)
 
-    less_luma = tried(Group.BRIGHTNESS, luma_px=max(0.0, now.luma_px - trial_px)) < tried(
-        Group.BRIGHTNESS, luma_px=now.luma_px + trial_px
-    )
-    less_chroma = tried(Group.COLOUR, chroma_px=max(0.0, now.chroma_px - trial_px)) < tried(
-        Group.COLOUR, chroma_px=now.chroma_px + trial_px
-    )
-    exposure_s = now.exposure_s
+    def less(group: Group, name: str, value: float, trial: float) -> bool:
+        return tried(group, **{name: max(0.0, value - trial)}) < tried(group, **{name: value + trial})
+
+    changed, streak_px = now, math.hypot(*ball.streak_px)
     if math.hypot(*ball.speed_px_s) * EXPOSURE_TRIAL_S > LEAST_STREAK_PX:
-        shorter, longer = max(0.0, exposure_s - EXPOSURE_TRIAL_S), exposure_s + EXPOSURE_TRIAL_S
-        less = tried(Group.BRIGHTNESS, exposure_s=shorter) < tried(Group.BRIGHTNESS, exposure_s=longer)
-        exposure_s = min(EXPOSURE_MAX_S, max(0.0, exposure_s + (-EXPOSURE_STEP_S if less else EXPOSURE_STEP_S)))
-    return replace(
-        now,
-        luma_px=_stepped(now.luma_px, less_luma, step_px),
-        chroma_px=_stepped(now.chroma_px, less_chroma, step_px),
-        exposure_s=exposure_s,
-    )
+        less_s = less(Group.BRIGHTNESS, "exposure_s", now.exposure_s, EXPOSURE_TRIAL_S)
+        exposure_s = _stepped(now.exposure_s, less_s, step_px * EXPOSURE_S_PX, EXPOSURE_MAX_S)
+        changed = replace(changed, exposure_s=exposure_s)
+    if streak_px < SMEARED_PX:
+        less_luma = less(Group.BRIGHTNESS, "luma_px", now.luma_px, trial_px)
+        less_chroma = less(Group.COLOUR, "chroma_px", now.chroma_px, trial_px)
+        changed = replace(
+            changed,
+            luma_px=_stepped(now.luma_px, less_luma, step_px, BLUR_MAX_PX),
+            chroma_px=_stepped(now.chroma_px, less_chroma, step_px, BLUR_MAX_PX),
+        )
+    return changed
 
 
-def _stepped(now_px: float, less: bool, step_px: float) -> float:
-    return min(BLUR_MAX_PX, max(0.0, now_px + (-step_px if less else step_px)))
+def _stepped(now: float, less: bool, step: float, most: float) -> float:
+    return min(most, max(0.0, now + (-step if less else step)))
 
 
 @compiled("void(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")

@@ -11,7 +11,7 @@ import pytest
 from tools.bench.trial import Flown, Trial, fly
 from tracker import so3
 from tracker.scene import Look
-from tracker.sources.paths import Pose, ScriptedPath
+from tracker.sources.paths import PATHS, Pose, ScriptedPath
 from tracker.sources.sim import START_NS, SimTiming
 
 SETTLED_S = 1.0
@@ -39,11 +39,13 @@ def turning(t_s: float) -> Pose:
     return np.zeros(3), so3.from_euler(0.0, 0.0, TURN_RAD_S * t_s)
 
 
-MOTIONS: dict[str, str | ScriptedPath] = {
-    "level": ScriptedPath("level", level, START_NS),
-    "upright": ScriptedPath("upright", upright, START_NS),
-    "turning": ScriptedPath("turning", turning, START_NS),
-    "all at once": "fast",
+# A scripted vehicle waits for its start; half of the first picture would show it standing still.
+UNDER_WAY_NS = START_NS - 1_000_000_000
+MOTIONS = {
+    "level": ScriptedPath("level", level, UNDER_WAY_NS),
+    "upright": ScriptedPath("upright", upright, UNDER_WAY_NS),
+    "turning": ScriptedPath("turning", turning, UNDER_WAY_NS),
+    "all at once": ScriptedPath("fast", PATHS["fast"], UNDER_WAY_NS),
 }
 LOOKS = {
     f"{ms} ms, gamma {gamma}": Look(exposure_s=ms * 1e-3, sub_exposures=2 * ms + 1, gamma=gamma)

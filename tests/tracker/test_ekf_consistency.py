@@ -86,8 +86,9 @@ def flown(
 def first(truth: State, rng: np.random.Generator) -> State:
     """Return a first guess near the truth, as whole frames give it."""
     rough = perturbed(truth, rng.normal(size=12) * np.repeat([0.001, 0.01, 0.0, 0.0], 3))
+    offset_s = np.full(1, PROCESS.clock_offset_s)
     return replace(
-        rough, v_BinW=np.zeros(3), w_BinB=np.zeros(3), P=start_covariance(PROCESS, np.full(1, PROCESS.clock_offset_s), 0.05, 0.3),
+        rough, v_BinW=np.zeros(3), w_BinB=np.zeros(3), P=start_covariance(PROCESS, offset_s, 0.05, 0.3),
         offsets_s=np.zeros(2), levels=start_levels(), noise=start_noise(2, PROCESS.pixel_noise_px),
         manoeuvre_s=PROCESS.manoeuvre_s,
     )  # fmt: skip
