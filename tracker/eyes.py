@@ -34,6 +34,11 @@ class Eyes:
         """Return how often the first images should be gone over again, since nothing else is known yet."""
         return max(rivals.lessons_due for rivals in self._rivals)
 
+    @property
+    def exposure_s(self) -> float:
+        """Return how long the slowest shutter stands open, as learned [s]."""
+        return max(rivals.best.response.exposure_s for rivals in self._rivals)
+
     def look(self, frames: Sequence[Frame], state: State) -> Look:
         """Find each ball in each image where a state expects it."""
         look = look_near(frames, self._rig, state, [rivals.best for rivals in self._rivals])

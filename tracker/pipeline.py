@@ -17,6 +17,7 @@ import numpy as np
 
 from tracker import so3
 from tracker.acquire import first_state
+from tracker.bias import shared_covariance
 from tracker.detect import Blob
 from tracker.ekf import Update, update
 from tracker.eyes import Eyes
@@ -239,13 +240,15 @@ class Tracker:
 
     def _estimate(self, found: Update, available_ns: int, stages: dict[str, int]) -> Estimate:
         state = found.state
+        covariance = state.P[:REPORTED, :REPORTED].copy()
+        covariance[:3, :3] += shared_covariance(state, self._rig, self._eyes.exposure_s)
         return Estimate(
             t_ns=state.t_ns,
             p_BinW=frozen_array(state.p_BinW),
             R_BtoW=frozen_array(state.R_BtoW),
             v_BinW=frozen_array(state.v_BinW),
             w_BinB=frozen_array(state.w_BinB),
-            covariance=frozen_array(state.P[:REPORTED, :REPORTED]),
+            covariance=frozen_array(covariance),
             clock_offsets_s=frozen_array(state.offsets_s),
             clock_sigmas_s=frozen_array(np.sqrt(np.append(0.0, np.diag(state.P)[OFFSETS:]))),
             state=self._track,
