@@ -6,13 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tracker.compiled import compiled
 from tracker.correction import innovation_covariance, path_noise
 from tracker.manoeuvre import variances
 from tracker.measure import Indices, camera_table, marker_points, pixels
 from tracker.predict import Prediction
 from tracker.rig import Rig
 from tracker.singer import process_noise
-from tracker.state import ATTITUDE, OFFSETS, POSITION, RATE, VELOCITY
+from tracker.state import OFFSETS
 from tracker.types import Array, BallSighting
 
 
@@ -57,11 +58,7 @@ class Batch:
 
     def distances2(self) -> list[float]:
         """Return each sighting's squared Mahalanobis distance (n,), as far as the envelope goes; inf where unseen."""
-        S = self.A + self.tops[0] * self.B[0] + self.tops[1] * self.B[1]
-        found = []
-        for i in range(0, len(self.y), 2):
-            (a, b), (_, d), (u, v) = S[i, i : i + 2].tolist(), S[i + 1, i : i + 2].tolist(), self.y[i : i + 2].tolist()
-            found.append((d * u * u - 2.0 * b * u * v + a * v * v) / (a * d - b * b))
+        found: list[float] = _distances2(self.y, self.A, self.B, self.tops).tolist()
         return found
 
 
@@ -72,34 +69,70 @@ def make_batch(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig)
     balls = np.array([s.ball for s in sightings])
     lags_s = np.array([s.t_ns - state.t_ns for s in sightings]) * 1e-9
     z = np.concatenate([s.uv_px for s in sightings])
-    R = np.diag(np.repeat(state.noise[cameras, 0], 2))
-    for i, sighting in enumerate(sightings):
-        R[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] += sighting.cov_px
+    covs_px = np.concatenate([s.cov_px for s in sightings])
     h, H = pixels(state.mean, T, cameras, balls, lags_s, camera_table(rig), marker_points(rig))
-    size, true_lags_s = len(state.P), lags_s + state.offsets_s[cameras]
-    path = np.stack([path_noise(H, cameras, true_lags_s, T, first) for first in (0, 3)])
-    Q = (process_noise(size, ahead.dt, T, 1.0, 0.0), process_noise(size, ahead.dt, T, 0.0, 1.0))
-    B = np.stack([innovation_covariance(H, unit, own) for unit, own in zip(Q, path, strict=True)])
-    doubt = _doubt(ahead, H, cameras)
-    A = innovation_covariance(H, ahead.P_coasted, R + doubt)
-    tops = variances(ahead.process)[:, -1]
-    return Batch(sightings, z, R, cameras, balls, lags_s, z - h, A, B, path, doubt, tops)
+    true_lags_s = lags_s + state.offsets_s[cameras]
+    R, A, B, path, doubt = _covariances(H, ahead.P_coasted, ahead.dt, T, covs_px, state.noise, cameras, true_lags_s)
+    return Batch(sightings, z, R, cameras, balls, lags_s, z - h, A, B, path, doubt, variances(ahead.process)[:, -1])
 
 
-def _doubt(ahead: Prediction, H: Array, cameras: Indices) -> Array:
+@compiled("f8[::1](f8[::1], f8[:, ::1], f8[:, :, ::1], f8[:])")
+def _distances2(y: Array, A: Array, B: Array, tops: Array) -> Array:
+    """Return y' S^-1 y (n,) of each sighting's 2 x 2 block."""
+    found = np.empty(len(y) // 2)
+    for s in range(len(found)):
+        i = 2 * s
+        a = A[i, i] + tops[0] * B[0, i, i] + tops[1] * B[1, i, i]
+        b = A[i, i + 1] + tops[0] * B[0, i, i + 1] + tops[1] * B[1, i, i + 1]
+        d = A[i + 1, i + 1] + tops[0] * B[0, i + 1, i + 1] + tops[1] * B[1, i + 1, i + 1]
+        u, v = y[i], y[i + 1]
+        found[s] = (d * u * u - 2.0 * b * u * v + a * v * v) / (a * d - b * b)
+    return found
+
+
+@compiled("f8[:, ::1](f8[:, ::1], f8[:, ::1], i8[::1])")
+def _doubt(P: Array, H: Array, cameras: Indices) -> Array:
     """Return the covariance (2n, 2n) [px^2] of unknown speed times unknown clock offset.
 
     Source: a pixel goes by J (v + dv) (o + do). dv do is of second order, and no slope at v = 0, o = 0 shows it; its
         covariance is J P_vv J' P_oo, the two being independent at first; the same for the body's turn.
     """
-    P = ahead.P_coasted
     doubt = np.zeros((len(H), len(H)))
-    owners = np.repeat(cameras, 2)
-    for camera in range(1, len(P) - OFFSETS + 1):
-        variance = P[OFFSETS + camera - 1, OFFSETS + camera - 1]
-        rows = np.flatnonzero(owners == camera)
-        if variance == 0.0 or len(rows) == 0:
+    for i in range(len(H)):
+        camera = cameras[i // 2]
+        variance = P[OFFSETS + camera - 1, OFFSETS + camera - 1] if camera > 0 else 0.0
+        if variance == 0.0:
             continue
-        J, L = H[rows, POSITION], H[rows, ATTITUDE]
-        doubt[rows[:, None], rows] = variance * (J @ P[VELOCITY, VELOCITY] @ J.T + L @ P[RATE, RATE] @ L.T)
+        for j in range(len(H)):
+            if cameras[j // 2] == camera:
+                for k in range(3):
+                    for m in range(3):
+                        speed = H[i, k] * P[6 + k, 6 + m] * H[j, m]
+                        doubt[i, j] += variance * (speed + H[i, 3 + k] * P[9 + k, 9 + m] * H[j, 3 + m])
     return doubt
+
+
+@compiled("Tuple((f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1]))"
+          "(f8[:, ::1], f8[:, ::1], f8, f8, f8[:, ::1], f8[:, ::1], i8[::1], f8[::1])")  # fmt: skip
+def _covariances(
+    H: Array, P: Array, dt: float, T: float, covs_px: Array, noise: Array, cameras: Indices, lags_s: Array
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Return R, A, B, path and doubt of a `Batch`.
+
+    Args:
+        H (2n, size), P: slope of the sightings and coasted covariance.  covs_px: (2n, 2) the fits' own, one below the
+        other.  noise: `State.noise`.  lags_s: (n,) of each sighting's true time after the state's.
+    """
+    rows, size = H.shape
+    R = np.zeros((rows, rows))
+    for i in range(rows):
+        first = i - i % 2
+        R[i, first], R[i, first + 1] = covs_px[i, 0], covs_px[i, 1]
+        R[i, i] += noise[cameras[i // 2], 0]
+    path, B = np.empty((2, rows, rows)), np.empty((2, rows, rows))
+    for k in range(2):
+        path[k] = path_noise(H, cameras, lags_s, T, 3 * k)
+        unit = process_noise(size, dt, T, 1.0 - k, float(k))
+        B[k] = innovation_covariance(H, unit, path[k])
+    doubt = _doubt(P, H, cameras)
+    return R, innovation_covariance(H, P, R + doubt), B, path, doubt

@@ -10,6 +10,7 @@ from tracker.compiled import compiled
 from tracker.measure import Indices, pixels
 from tracker.singer import unit_noise
 from tracker.so3_compiled import turn_into
+from tracker.solve import dot
 from tracker.types import Array
 
 MAX_ITERATIONS = 8
@@ -74,6 +75,19 @@ def inverse_of(S: Array) -> Array:
     return inverse
 
 
+@compiled("Tuple((f8[::1], f8[:, ::1], f8))(f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
+def weighed(y: Array, H: Array, P: Array, R: Array) -> tuple[Array, Array, float]:
+    """Return S^-1 y, S^-1 and y' S^-1 y of the sightings, the two last rows (the tilt) left out."""
+    n = len(y) - TILT_ROWS
+    inverse = inverse_of(innovation_covariance(H[:n], P, R[:n, :n].copy()))
+    u, nis = np.zeros(n), 0.0
+    for i in range(n):
+        for j in range(n):
+            u[i] += inverse[i, j] * y[j]
+        nis += u[i] * y[i]
+    return u, inverse, nis
+
+
 @compiled("f8[:, ::1](f8[:, ::1], i8[::1], f8[::1], f8, i8)")
 def path_noise(H: Array, cameras: Indices, lags_s: Array, T: float, first: int) -> Array:
     """Return the covariance (2n, 2n) [px^2] of what an unknown path adds between the state's time and the cameras'.
@@ -95,28 +109,35 @@ def path_noise(H: Array, cameras: Indices, lags_s: Array, T: float, first: int) 
     return R
 
 
-@compiled("f8[:, ::1](f8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])")
-def log_likelihoods(y: Array, A: Array, B: Array, variances: Array, means: Array) -> Array:
+@compiled("f8[:, ::1](f8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], UniTuple(f8, 2))")
+def log_likelihoods(y: Array, A: Array, B: Array, variances: Array, means: tuple[float, float]) -> Array:
     """Return the log likelihoods (2, levels) of innovations y (n,) under S = A + s B[0] + r B[1], up to a constant.
 
     Args:
         B: (2, n, n) by a variance of 1 of translation and of rotation.
         variances: (2, levels) tried of one, while the other has its mean.  means: (2,).
     """
-    found = np.empty(variances.shape)
+    n = len(y)
+    found, L, white = np.empty(variances.shape), np.empty((n, n)), np.empty(n)
     for k in range(2):
-        for i in range(variances.shape[1]):
-            L = factor(A + variances[k, i] * B[k] + means[1 - k] * B[1 - k])
-            white = forward(L, y.reshape(-1, 1))
-            total = 0.0
-            for j in range(len(y)):
-                total -= 0.5 * white[j, 0] ** 2 + math.log(L[j, j])
-            found[k, i] = total
+        for level in range(variances.shape[1]):
+            total, s, r = 0.0, variances[k, level], means[1 - k]
+            for i in range(n):
+                for j in range(i + 1):
+                    L[i, j] = A[i, j] + s * B[k, i, j] + r * B[1 - k, i, j]
+                white[i] = y[i]
+            for i in range(n):
+                for j in range(i):
+                    L[i, j] = (L[i, j] - dot(L[i, :j], L[j, :j])) / L[j, j]
+                L[i, i] = math.sqrt(L[i, i] - dot(L[i, :i], L[i, :i]))
+                white[i] = (white[i] - dot(L[i, :i], white[:i])) / L[i, i]
+                total -= 0.5 * white[i] ** 2 + math.log(L[i, i])
+            found[k, level] = total
     return found
 
 
 @compiled("f8[::1](f8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")
-def _moved(mean: Array, dx: Array, E: Array, J_r: Array) -> Array:
+def moved(mean: Array, dx: Array, E: Array, J_r: Array) -> Array:
     """Return the mean with the error dx put in, and write exp and right Jacobian of its turn into E and J_r."""
     now = mean.copy()
     turn_into(dx[3], dx[4], dx[5], E, J_r)
@@ -189,7 +210,7 @@ def likeliest(
     H = np.zeros((rows, size))
     E, J_r = np.empty((3, 3)), np.empty((3, 3))
     for _ in range(MAX_ITERATIONS):
-        now = _moved(mean, dx, E, J_r)
+        now = moved(mean, dx, E, J_r)
         h, slope = pixels(now, T, cameras, balls, lags_s, table, points_inB)
         if not np.isfinite(h).all():
             dx[:] = math.nan

@@ -6,25 +6,23 @@ state goes in, a new state comes out.
 
     predict  coast to the new time (predict)
     update   gate each sighting (batch) -> how brisk is the manoeuvre (manoeuvre), which state is likeliest (fit)
-             -> leave out liars -> one linear update with the converged slope (filterpy) -> learn the noise (noise)
+             -> leave out liars -> one linear update with the converged slope and learn the noise (posterior)
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from filterpy.kalman import ExtendedKalmanFilter
 
-from tracker import so3
 from tracker.batch import Batch, make_batch
 from tracker.fit import Fit, fit
 from tracker.gate import chi2_limit
-from tracker.noise import learned
+from tracker.posterior import settled
 from tracker.predict import Prediction
 from tracker.rig import Rig
-from tracker.state import ATTITUDE, State
+from tracker.state import State
 from tracker.types import BallSighting, Reason, Rejected
 
 MAX_SUSPECTS = 8
@@ -128,17 +126,8 @@ def _left_out(sighting: BallSighting, rig: Rig, distance2: float, where: str) ->
 
 
 def _posterior(prior: State, best: Fit) -> State:
-    """Take the likeliest state, and the covariance of one linear step there from the prior, by filterpy.
-
-    Source: exp(theta + d) = exp(theta) exp(J_r(theta) d), so the error about the new attitude is J_r d.
-    """
-    rows = len(best.y)
-    filter_ = ExtendedKalmanFilter(dim_x=len(best.P), dim_z=rows)
-    filter_.P = best.P
-    filter_.update(best.y[:, None], lambda _: best.H, lambda _: np.zeros((rows, 1)), R=best.R)
-    P, dx = filter_.P.copy(), best.dx
-    turned = so3.right_jacobian(dx[ATTITUDE])
-    P[ATTITUDE] = turned @ P[ATTITUDE]
-    P[:, ATTITUDE] = P[:, ATTITUDE] @ turned.T
-    noise = learned(prior.noise, best.batch.cameras, best.u, best.inverse)
-    return replace(prior.moved(dx), P=(P + P.T) / 2.0, levels=best.levels, noise=noise)
+    """Take the likeliest state, and the covariance of one linear step there from the prior."""
+    mean, P, noise = settled(
+        prior.mean, best.dx, best.P, best.H, best.R, prior.noise, best.batch.cameras, best.u, best.inverse
+    )
+    return prior.at_mean(prior.t_ns, mean, P, best.levels, noise)

@@ -8,7 +8,9 @@ import numpy as np
 
 from tracker import manoeuvre
 from tracker.batch import Batch
-from tracker.correction import TILT_ROWS, innovation_covariance, inverse_of, likeliest, log_likelihoods
+from tracker.compiled import compiled
+from tracker.correction import TILT_ROWS, likeliest, log_likelihoods, weighed
+from tracker.manoeuvre import expected, judged
 from tracker.measure import camera_table, marker_points
 from tracker.predict import Prediction
 from tracker.rig import Rig
@@ -64,26 +66,44 @@ def fit(ahead: Prediction, batch: Batch, rig: Rig, *, adapt: bool = True) -> Fit
     Two balls do not show the turn about their line. Then roll and pitch, which stay within bounds over a flight, bound
     it, and where its curvature shows, that goes into the noise and the fit is made again (`_bend`).
     """
-    state, process = ahead.state, ahead.process
-    levels, of = state.levels, manoeuvre.variances(process)
-    if adapt and ahead.dt > 0.0:
-        means = np.array(manoeuvre.expected(levels, of))
-        levels = manoeuvre.judged(levels, log_likelihoods(batch.y, batch.A, batch.B, of, means))
-    translation, rotation = manoeuvre.expected(levels, of)
-    P = ahead.P_coasted + process_noise(len(state.P), ahead.dt, process.manoeuvre_s, translation, rotation)
-    n = len(batch.z)
-    R = np.zeros((n + TILT_ROWS, n + TILT_ROWS))
-    R[:n, :n] = batch.R + translation * batch.path[0] + rotation * batch.path[1]
+    process, n = ahead.process, len(batch.z)
     # A tilt that lasts, as white noise of the same spectral density.
-    R[range(n, n + TILT_ROWS), range(n, n + TILT_ROWS)] = (
-        2.0 * process.tilt_rad**2 * process.tilt_s / max(ahead.dt, SHORTEST_S)
-    )
+    tilt = 2.0 * process.tilt_rad**2 * process.tilt_s / max(ahead.dt, SHORTEST_S)
+    levels, P, R, doubtful = _prepared(
+        ahead.state.levels, manoeuvre.variances(process), batch.y, batch.A, batch.B, batch.R, batch.path, batch.doubt,
+        ahead.P_coasted, ahead.dt, process.manoeuvre_s, tilt, adapt,
+    )  # fmt: skip
     agreed = _fitted(ahead, batch, rig, levels, P, R)
-    if float(np.trace(batch.doubt)) < LEAST_DOUBT * float(np.trace(R[:n, :n])):
+    if not doubtful:
         return agreed
     R[:n, :n] += batch.doubt
     doubted = _fitted(ahead, batch, rig, levels, P, R)
     return _likelier(agreed, doubted)
+
+
+@compiled("Tuple((f8[:, ::1], f8[:, ::1], f8[:, ::1], b1))(f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1],"
+          " f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8, f8, f8, b1)")  # fmt: skip
+def _prepared(
+    levels: Array, of: Array, y: Array, A: Array, B: Array, R_pixels: Array, path: Array, doubt: Array,
+    P_coasted: Array, dt: float, T: float, tilt: float, adapt: bool,
+) -> tuple[Array, Array, Array, bool]:  # fmt: skip
+    """Return levels, prior covariance, noise of pixels and tilt, and whether the doubt of the clocks matters.
+
+    tilt: variance of roll and of pitch.  The others as `Batch`, `Prediction` and `manoeuvre` name them.
+    """
+    n = len(y)
+    if adapt and dt > 0.0:
+        levels = judged(levels, log_likelihoods(y, A, B, of, expected(levels, of)))
+    translation, rotation = expected(levels, of)
+    R, noise, doubts = np.zeros((n + TILT_ROWS, n + TILT_ROWS)), 0.0, 0.0
+    for i in range(n):
+        for j in range(n):
+            R[i, j] = R_pixels[i, j] + translation * path[0, i, j] + rotation * path[1, i, j]
+        noise, doubts = noise + R[i, i], doubts + doubt[i, i]
+    for i in range(n, n + TILT_ROWS):
+        R[i, i] = tilt
+    P = P_coasted + process_noise(len(P_coasted), dt, T, translation, rotation)
+    return levels, P, R, not doubts < LEAST_DOUBT * noise
 
 
 def _likelier(agreed: Fit | None, doubted: Fit | None) -> Fit | None:
@@ -110,9 +130,8 @@ def _fitted(ahead: Prediction, batch: Batch, rig: Rig, levels: Array, P: Array, 
             dx, y, H, variances = _solve(ahead, batch, rig, P, R)
             if not np.isfinite(dx).all():
                 return None
-    inverse = inverse_of(innovation_covariance(H[:n], P, R[:n, :n].copy()))
-    u = inverse @ y[:n]
-    return Fit(batch, dx, P, levels, y, H, R, u, inverse, float(y[:n] @ u))
+    u, inverse, nis = weighed(y, H, P, R)
+    return Fit(batch, dx, P, levels, y, H, R, u, inverse, nis)
 
 
 def _solve(ahead: Prediction, batch: Batch, rig: Rig, P: Array, R: Array) -> tuple[Array, Array, Array, Array]:

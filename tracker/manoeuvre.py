@@ -11,9 +11,11 @@ Source: a hidden Markov model over the levels, moment-matched to one Gaussian ea
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
+from tracker.compiled import compiled
 from tracker.state import Process
 from tracker.types import Array
 
@@ -28,6 +30,7 @@ def start_levels() -> Array:
     return np.full((2, LEVELS), 1.0 / LEVELS)
 
 
+@lru_cache(maxsize=16)
 def variances(process: Process) -> Array:
     """Return the levels' variances of acceleration (2, LEVELS): translation [m^2/s^4], rotation [rad^2/s^4]."""
     shares = STEP ** (2.0 * np.arange(1 - LEVELS, 1))
@@ -35,24 +38,29 @@ def variances(process: Process) -> Array:
     return np.asarray(tops[:, None] * shares)
 
 
+@compiled("f8[:, ::1](f8[:, ::1], f8)")
 def later(levels: Array, dt: float) -> Array:
     """Return the probabilities (2, LEVELS) after dt without a sighting."""
-    leave = 1.0 - math.exp(-dt / CHANGE_S)
-    beside = np.zeros_like(levels)
-    beside[:, 1:] += levels[:, :-1] / 2.0
-    beside[:, :-1] += levels[:, 1:] / 2.0
-    beside[:, 0] += levels[:, 0] / 2.0
-    beside[:, -1] += levels[:, -1] / 2.0
-    return np.asarray((1.0 - leave) * levels + leave * (NEXT_SHARE * beside + (1.0 - NEXT_SHARE) / LEVELS))
+    leave, after, last = 1.0 - math.exp(-dt / CHANGE_S), np.empty(levels.shape), levels.shape[1] - 1
+    for k in range(2):
+        for i in range(last + 1):
+            beside = (levels[k, max(i - 1, 0)] + levels[k, min(i + 1, last)]) / 2.0
+            change = NEXT_SHARE * beside + (1.0 - NEXT_SHARE) / LEVELS
+            after[k, i] = (1.0 - leave) * levels[k, i] + leave * change
+    return after
 
 
+@compiled("f8[:, ::1](f8[:, ::1], f8[:, ::1])")
 def judged(levels: Array, log_likelihoods: Array) -> Array:
     """Return the probabilities (2, LEVELS) after pixels of these log likelihoods (2, LEVELS) under each level."""
-    weights = levels * np.exp(log_likelihoods - log_likelihoods.max(axis=1, keepdims=True))
-    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+    after = np.empty(levels.shape)
+    for k in range(2):
+        after[k] = levels[k] * np.exp(log_likelihoods[k] - log_likelihoods[k].max())
+        after[k] /= after[k].sum()
+    return after
 
 
+@compiled("UniTuple(f8, 2)(f8[:, ::1], f8[:, ::1])")
 def expected(levels: Array, of: Array) -> tuple[float, float]:
     """Return the mean variances of translation and rotation."""
-    mean = (levels * of).sum(axis=1)
-    return float(mean[0]), float(mean[1])
+    return (levels[0] * of[0]).sum(), (levels[1] * of[1]).sum()
