@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from filterpy.kalman import ExtendedKalmanFilter
 
 from tracker.batch import Batch, make_batch
 from tracker.fit import Fit, fit
@@ -126,8 +127,10 @@ def _left_out(sighting: BallSighting, rig: Rig, distance2: float, where: str) ->
 
 
 def _posterior(prior: State, best: Fit) -> State:
-    """Take the likeliest state, and the covariance of one linear step there from the prior."""
-    mean, P, noise = settled(
-        prior.mean, best.dx, best.P, best.H, best.R, prior.noise, best.batch.cameras, best.u, best.inverse
-    )
+    """Take the likeliest state, and the covariance of one linear step there from the prior, by filterpy."""
+    rows = len(best.y)
+    filter_ = ExtendedKalmanFilter(dim_x=len(best.P), dim_z=rows)
+    filter_.P = best.P
+    filter_.update(best.y[:, None], lambda _: best.H, lambda _: np.zeros((rows, 1)), R=best.R)
+    mean, P, noise = settled(prior.mean, best.dx, filter_.P, prior.noise, best.batch.cameras, best.u, best.inverse)
     return prior.at_mean(prior.t_ns, mean, P, best.levels, noise)
