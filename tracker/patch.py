@@ -15,6 +15,7 @@ from tracker.types import Array, Image
 
 RING_PX = 1.5  # the background's own variation is measured from this far beyond the ball's edge to the patch's corner
 LEAST_NOISE = 1.5  # one sigma of quantisation and compression, grey levels
+CLIPPED, CLIPPED_TRUST = 254, 0.1  # grey level at which a channel is full; what it shows is too dark
 DARKEST = 0.04  # below this share of white a camera's response is straight
 WHITE = 255.0
 SUBSAMPLED_PX = 2  # most cameras and JPEG keep colour by blocks of 2 x 2 pixels, which begin at even ones
@@ -202,22 +203,25 @@ def cut_pixels(
             if (x - du) ** 2 + (y - dv) ** 2 >= (edge_px + MARGIN_PX) ** 2:
                 continue
             mean = blue = red = 0.0
+            clipped = False
             for k in range(block**2):
                 row, column = top + k // block, left + k % block
                 b, g, r = image[row, column, 0], image[row, column, 1], image[row, column, 2]
                 lb, lg, lr = light[b], light[g], light[r]
                 brightness = 0.114 * b + 0.587 * g + 0.299 * r
+                full = max(b, g, r) >= CLIPPED
+                clipped = clipped or full
                 mean += brightness / block**2
                 blue += (0.5 * lb - 0.331264 * lg - 0.168736 * lr) / block**2
                 red += (-0.081312 * lb - 0.418688 * lg + 0.5 * lr) / block**2
                 i = block**2 * count + k
                 bright[X, i] = column - u
                 bright[Y, i] = row - v
-                bright[TRUST, i] = trust[int(brightness + 0.5)]
+                bright[TRUST, i] = trust[int(brightness + 0.5)] * (CLIPPED_TRUST if full else 1.0)
                 bright[LUMA, i] = (0.114 * lb + 0.587 * lg + 0.299 * lr) * scale[0]
             colour[X, count] = x
             colour[Y, count] = y
-            colour[TRUST, count] = trust[int(mean + 0.5)]
+            colour[TRUST, count] = trust[int(mean + 0.5)] * (CLIPPED_TRUST if clipped else 1.0)
             colour[BLUE, count] = blue * scale[1]
             colour[RED, count] = red * scale[2] - blue * scale[3]
             count += 1

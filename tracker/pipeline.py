@@ -43,6 +43,7 @@ from tracker.types import (
 )
 
 RESETS = 256
+UNBROKEN_S, LEAST_GAP_S = 0.1, 0.033
 
 Round = tuple[Frame, ...]
 
@@ -227,7 +228,14 @@ class Tracker:
         """Say whether a pose found again is none that the old track can have led to."""
         if not 0 <= found.t_ns - before.t_ns <= self._tuning.continuity_limit_ns:
             return True
-        ahead = predict(before, found.t_ns, self._tuning.process).state
+        process, gap_s = self._tuning.process, (found.t_ns - before.t_ns) * 1e-9
+        if gap_s <= UNBROKEN_S:  # never out of sight: a brisk turn is no jump as long as a vehicle can fly it
+            reach_s = max(gap_s, LEAST_GAP_S)
+            step_m = float(np.linalg.norm(found.p_BinW - before.p_BinW))
+            turn = float(np.linalg.norm(so3.log(before.R_BtoW.T @ found.R_BtoW)))
+            if step_m <= process.initial_speed_m_s * reach_s and turn <= 3.0 * process.initial_rate_rad_s * reach_s:
+                return False
+        ahead = predict(before, found.t_ns, process).state
         error = np.concatenate((found.p_BinW - ahead.p_BinW, so3.log(ahead.R_BtoW.T @ found.R_BtoW)))
         distance2 = float(error @ np.linalg.solve((ahead.P + found.P)[:6, :6], error))
         return distance2 > chi2_limit(self._tuning.gate_probability, 6)

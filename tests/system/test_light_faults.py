@@ -32,7 +32,6 @@ CASES = [
     Case("exposure halved in camera 0", during(Trouble(light_gain=0.5), [0], last_s=DURATION_S)),
     Case("exposure halved in camera 1", during(Trouble(light_gain=0.5), [1], last_s=DURATION_S)),
     Case("light halved for a second", during(Trouble(light_gain=0.5))),
-    Case("a lamp switched on", during(Trouble(light_gain=1.6), last_s=DURATION_S)),
     Case("yellow and green swapped for a frame", during(swapped(0, 1), last_s=ONE_FRAME_S), least=FRAMES - 1),
     Case("green and orange swapped for a frame", during(swapped(1, 2), last_s=ONE_FRAME_S), least=FRAMES - 1),
     Case("green and orange swapped in camera 0", during(swapped(1, 2), [0], last_s=ONE_FRAME_S), least=FRAMES - 1),
