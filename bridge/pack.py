@@ -10,7 +10,7 @@ from functools import cached_property
 from types import MappingProxyType
 
 # The v20 dialect always frames MAVLink 2; mavutil would look at the environment and may cut the extension fields.
-from pymavlink.dialects.v20 import common
+from pymavlink.dialects.v20 import ardupilotmega as common
 
 from bridge.ned import NedFrame, NedPose, NedVelocity
 from bridge.wire import FieldValue, Message, Received
@@ -146,6 +146,22 @@ class Packer:
 def heartbeat(t_ns: int) -> Message:
     """Return the heartbeat of stream time t_ns [ns]."""
     return Message(HEARTBEAT, t_ns, 0, _HEARTBEAT_FIELDS)
+
+
+def make_message(name: str, t_ns: int, **fields: FieldValue) -> Message:
+    """Return a message of any name in the dialect; fields that are not given are zero."""
+    dialect_class = _CLASSES[name]
+    kinds = dict(zip(dialect_class.fieldnames, dialect_class.fieldtypes, strict=True))
+    lengths = dict(zip(dialect_class.ordered_fieldnames, dialect_class.array_lengths, strict=True))
+    zero: Fields = {
+        field: "" if kind == "char" else [0] * lengths[field] if lengths[field] else 0 for field, kind in kinds.items()
+    }
+    return Message(name, t_ns, 0, MappingProxyType(zero | fields))
+
+
+def enum(name: str) -> int:
+    """Return a constant of the dialect."""
+    return int(getattr(common, name))
 
 
 class Encoder:
