@@ -20,6 +20,9 @@ from tools.simulate.autopilot.reports import NUMBERS, Snapshot, report
 ACCEPTED, DENIED, UNSUPPORTED, FAILED = 0, 2, 3, 4
 """MAV_RESULT."""
 
+SET_GLOBAL_ORIGIN = 611
+"""MAV_CMD_DO_SET_GLOBAL_ORIGIN, younger than the dialect pymavlink ships."""
+
 
 class Vessel(Protocol):
     """What requests may reach of the autopilot."""
@@ -94,7 +97,7 @@ def _command_long(fields: Mapping[str, FieldValue], port: Port, vessel: Vessel) 
 def _command_int(fields: Mapping[str, FieldValue], port: Port, vessel: Vessel) -> list[Message]:
     number = round(_number(fields, "command"))
     values = tuple(_number(fields, name) for name in ("param1", "param2", "param3", "param4", "x", "y", "z"))
-    if number == enum("MAV_CMD_DO_SET_GLOBAL_ORIGIN"):
+    if number == SET_GLOBAL_ORIGIN:
         place = Origin(round(values[4]), round(values[5]), round(1000 * values[6]))
         taken = vessel.set_origin(place)
         return [_ack(number, ACCEPTED if taken else FAILED)] + (_told("GPS_GLOBAL_ORIGIN", vessel) if taken else [])
