@@ -7,7 +7,6 @@ from collections import deque
 from tools.simulate.helicopter import State
 from tracker import so3
 from tracker.sources.paths import Pose
-from tracker.types import Array
 
 _MEMORY_NS = 2_000_000_000
 
@@ -34,10 +33,6 @@ class Course:
     def back(self, steps: int) -> State:
         """Return the state so many steps ago, the oldest where there are not as many."""
         return self._states[max(len(self._states) - 1 - steps, 0)][1]
-
-    def velocity_at(self, t_ns: int) -> Array:
-        """Return the true v_BinW (3,) [m/s] at t_ns, of the nearest step before it."""
-        return self.back(max(self.now_ns - t_ns, 0) // self._step_ns).v_BinW
 
     def pose_at(self, t_ns: int) -> Pose:
         """Return p_BinW (3,) [m] and R_BtoW (3, 3) at t_ns, between two steps on the shortest way."""

@@ -24,7 +24,7 @@ _RUNS, _POSITION = 0x400, 0x33F
 _TARGET_MASK = 0b1001_1100_0000  # position, velocity and yaw count; acceleration and yaw rate do not
 
 
-class FlightFailed(OperatorError):
+class FlightError(OperatorError):
     """The autopilot did not do what the plan wants, within its time."""
 
 
@@ -36,7 +36,7 @@ class Flight:
     """
 
     def __init__(self, mission: Mission, room_yaw: float, gives_origin: bool = True) -> None:
-        self._mission = mission
+        self.mission = mission
         self._room_yaw = room_yaw
         self._R_WtoN = rotation_from_room(room_yaw)
         self._gives_origin = gives_origin
@@ -47,8 +47,8 @@ class Flight:
         """Return the radio's channels: sticks in the middle, collective low, channel 8 the rotor."""
         return (1500, 1500, 1000, 1500, 1500, 1500, 1500, 2000 if self.rotor_on else 1000)
 
-    def plan(self, world: World, rehearsal: Iterator[None] = iter(())) -> Iterator[None]:
-        """Fly; the rehearsal of faults comes after the hover."""
+    def plan(self, world: World, rehearsal: Iterator[None]) -> Iterator[None]:
+        """Fly; the rehearsal of faults, if any, comes after the hover."""
         yield from self._prepare(world)
         yield from self._arm(world)
         yield from self._take_off(world)
@@ -58,13 +58,14 @@ class Flight:
         yield from self._follow(world, Phase.TURN)
         yield from self._land(world)
 
-    def hold(self, world: World, seconds: float) -> Iterator[None]:
-        """Stay at the mission's home point for a while."""
-        start, _ = self._mission.span_s(Phase.HOVER)
-        reference = self._mission.reference_at(start)
+    def hold(self, world: World, seconds: float, *, steers: bool = True) -> Iterator[None]:
+        """Stay at the mission's home point for a while. steers: whether the target is sent again and again."""
+        start, _ = self.mission.span_s(Phase.HOVER)
+        reference = self.mission.reference_at(start)
         until_ns = world.now_ns + round(seconds * 1e9)
         while world.now_ns < until_ns:
-            self._aim(world, reference)
+            if steers:
+                self._aim(world, reference)
             yield from _wait(world, _TARGET_S)
 
     def _prepare(self, world: World) -> Iterator[None]:
@@ -87,7 +88,7 @@ class Flight:
             if world.ground.acks.get(SET_ORIGIN) == 0:
                 self._mark(world, "origin")
                 return
-        raise FlightFailed(f"sitl: the origin was not taken (command 611 gives {world.ground.acks.get(SET_ORIGIN)})")
+        raise FlightError(f"sitl: the origin was not taken (command 611 gives {world.ground.acks.get(SET_ORIGIN)})")
 
     def _arm(self, world: World) -> Iterator[None]:
         world.phase = "arm"
@@ -100,12 +101,12 @@ class Flight:
                 self._mark(world, "armed")
                 return
         reasons = "; ".join(dict.fromkeys(text for _, text in world.ground.texts if "rm:" in text))
-        raise FlightFailed(f"sitl: it did not arm within 60 s: {reasons or 'no reason given'}")
+        raise FlightError(f"sitl: it did not arm within 60 s: {reasons or 'no reason given'}")
 
     def _take_off(self, world: World) -> Iterator[None]:
         world.phase = Phase.TAKE_OFF
-        home = self._mission.corners_inW[0]
-        height_m = float(home[2] - self._mission.ground_inW[2])
+        home = self.mission.corners_inW[0]
+        height_m = float(home[2] - self.mission.ground_inW[2])
         world.wanted_inW = home
         for _ in range(40):
             world.ground.command(TAKE_OFF, 0, 0, 0, 0, 0, 0, height_m)
@@ -113,7 +114,7 @@ class Flight:
             if world.ground.acks.get(TAKE_OFF) == 0:
                 break
         else:
-            raise FlightFailed(f"sitl: take-off was refused (command 22 gives {world.ground.acks.get(TAKE_OFF)})")
+            raise FlightError(f"sitl: take-off was refused (command 22 gives {world.ground.acks.get(TAKE_OFF)})")
         yield from _until(world, lambda: world.history[-1].p_BinW[2] > home[2] - 0.1, 60.0, "take-off height")
         self._mark(world, "up")
         yield from _wait(world, 1.0)
@@ -122,16 +123,16 @@ class Flight:
     def _follow(self, world: World, phase: Phase) -> Iterator[None]:
         """Give the mission's reference as a moving target."""
         world.phase = phase
-        start_s, end_s = self._mission.span_s(phase)
+        start_s, end_s = self.mission.span_s(phase)
         start_ns = world.now_ns
         self._mark(world, phase)
         while (t_s := start_s + (world.now_ns - start_ns) / 1e9) < end_s:
-            self._aim(world, self._mission.reference_at(t_s))
+            self._aim(world, self.mission.reference_at(t_s))
             yield from _wait(world, _TARGET_S)
 
     def _land(self, world: World) -> Iterator[None]:
         world.phase = Phase.LAND
-        world.wanted_inW = self._mission.ground_inW
+        world.wanted_inW = self.mission.ground_inW
         self._mark(world, Phase.LAND)
         yield from self._command(world, SET_MODE, 1, LAND)
         yield from _until(world, lambda: not _armed(world), 90.0, "disarming after the landing")
@@ -161,7 +162,7 @@ class Flight:
             yield from _wait(world, 0.2)
             if world.ground.acks.get(number) == 0:
                 return
-        raise FlightFailed(f"sitl: command {number} gives {world.ground.acks.get(number)} instead of 0 (accepted)")
+        raise FlightError(f"sitl: command {number} gives {world.ground.acks.get(number)} instead of 0 (accepted)")
 
     def _mark(self, world: World, what: str) -> None:
         self.marks_ns[what] = world.now_ns
@@ -195,5 +196,5 @@ def _until(world: World, there: Callable[[], bool], seconds: float, what: str) -
     while not there():
         if world.now_ns >= until_ns:
             texts = "; ".join(text for _, text in world.ground.texts[-5:])
-            raise FlightFailed(f"sitl: no {what} within {seconds:g} s; last said: {texts or 'nothing'}")
+            raise FlightError(f"sitl: no {what} within {seconds:g} s; last said: {texts or 'nothing'}")
         yield

@@ -44,12 +44,12 @@ class Conversation:
         """Send a COMMAND_LONG and return the MAV_RESULT that comes back."""
         parameters = {f"param{k + 1}": float(value) for k, value in enumerate(values)}
         self.say("COMMAND_LONG", target_system=1, target_component=1, command=number, **parameters)
-        return int(self._answer("COMMAND_ACK")["result"])
+        return int(str(self._answer("COMMAND_ACK")["result"]))
 
     def set_origin(self, latitude: int = LATITUDE, longitude: int = LONGITUDE) -> int:
         """Send MAV_CMD_DO_SET_GLOBAL_ORIGIN and return the MAV_RESULT that comes back."""
         self.say("COMMAND_INT", target_system=1, target_component=1, command=611, x=latitude, y=longitude, z=488.0)
-        return int(self._answer("COMMAND_ACK")["result"])
+        return int(str(self._answer("COMMAND_ACK")["result"]))
 
     def request(self, message_id: int, name: str) -> Mapping[str, FieldValue]:
         """Ask for one message and return its fields; empty where there is none."""
