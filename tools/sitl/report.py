@@ -90,6 +90,7 @@ def judge(history: list[Sample], estimates: list[tuple[Estimate, Pose]], mission
         hover &= t_s > t_s[hover][0] + _SETTLING_S
     errors_mm = [each.ekf_error_mm for each in history if each.phase in _FLOWN and each.ekf_error_mm is not None]
     modes = {each.mode for each in history if each.phase in _FLOWN}
+    ratios = [each.worst_ratio for each in history if each.phase in _FLOWN]
     position_mm, turn_deg = _tracking(estimates)
     return Verdict(
         (
@@ -100,7 +101,7 @@ def judge(history: list[Sample], estimates: list[tuple[Estimate, Pose]], mission
             Line("tracker, position error, RMS", _rms(position_mm), 10.0, "mm"),
             Line("tracker, attitude error, RMS", _rms(turn_deg), 1.2, "deg"),
             Line("autopilot, position error, RMS", _rms(np.array(errors_mm)), 20.0, "mm"),
-            Line("EKF variances, largest", max((each.worst_ratio for each in history), default=np.nan), 0.8, ""),
+            Line("EKF variances in flight, largest", max(ratios, default=np.nan), 0.8, ""),
         )
     )
 
