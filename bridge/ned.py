@@ -23,6 +23,8 @@ _FLIP = frozen_array([1.0, -1.0, -1.0])
 _MIN_COS_PITCH = 0.01
 _POSE_FLOAT32 = struct.Struct("<31f")
 _VELOCITY_FLOAT32 = struct.Struct("<12f")
+_TWIST_FLOAT32 = struct.Struct("<27f")
+_UPPER = np.triu_indices(6)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,6 +46,19 @@ class NedVelocity:
     """An estimate's velocity. v_BinN: [m/s]. covariance: row-major (3, 3), 9 long [m^2/s^2]; exact in 32 bits."""
 
     v_BinN: list[float]
+    covariance: list[float]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class NedTwist:
+    """An estimate's motion in the body's own axes; every float is exact in 32 bits.
+
+    v_BinF: [m/s].  w_BinF: [rad/s].
+    covariance: row-major upper triangle, 21 long, of the (6, 6) covariance of both.
+    """
+
+    v_BinF: list[float]
+    w_BinF: list[float]
     covariance: list[float]
 
 
@@ -85,6 +100,24 @@ class NedFrame:
         values = (self.R_WtoN @ estimate.v_BinW).tolist() + covariance.ravel().tolist()
         rounded = _VELOCITY_FLOAT32.unpack(_VELOCITY_FLOAT32.pack(*values))
         return NedVelocity(list(rounded[:3]), list(rounded[3:]))
+
+    def twist(self, estimate: Estimate) -> NedTwist:
+        """Turn an estimate's velocity and rate into F, with their covariance.
+
+        Derivation: v_B = R_BtoW' v. With R_BtoW = R_hat exp(theta) it changes by [v_B]x theta for an attitude error and
+        by R_hat' dv for a velocity error; the rate is the body's already. F is B with y and z turned about.
+        """
+        R_WtoB = estimate.R_BtoW.T
+        v_B = R_WtoB @ estimate.v_BinW
+        J = np.zeros((6, 12))
+        J[:3, 3:6] = so3.hat(v_B)
+        J[:3, 6:9] = R_WtoB
+        J[3:, 9:] = np.eye(3)
+        J *= np.tile(_FLIP, 2)[:, None]
+        covariance = J @ estimate.covariance @ J.T
+        values = (_FLIP * v_B).tolist() + (_FLIP * estimate.w_BinB).tolist() + covariance[_UPPER].tolist()
+        rounded = _TWIST_FLOAT32.unpack(_TWIST_FLOAT32.pack(*values))
+        return NedTwist(list(rounded[:3]), list(rounded[3:6]), list(rounded[6:]))
 
 
 def rotation_from_room(room_yaw: float) -> Array:

@@ -65,6 +65,7 @@ def run(events: Iterable[Event], tracker: Steps, clock: Clock, outlets: Outlets)
         events: frames in the order they are to be worked on.
         clock: stream time, in the base of the frames' own.
     """
+    outlets.links.listen(clock.now_ns)
     for event in events:
         if not isinstance(event, Rejected):
             clock.follow(event)

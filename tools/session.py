@@ -17,6 +17,7 @@ from bridge.pace import Paced, first_time_ns
 from bridge.recorder import Recorder
 from bridge.run import Outlets, Steps, close, run
 from bridge.settings import Settings
+from bridge.settings.terms import terms_of
 from bridge.settings.tuning import tuning_of
 from bridge.status import StatusLine
 from bridge.summary import Summary, to_text
@@ -97,8 +98,7 @@ def tracker_of(settings: Settings, rig: Rig, clocks: Clocks) -> Steps:
 def links_of(settings: Settings, clocks: Clocks) -> Outlet:
     """Open the links that the config or the command line names."""
     return open_outlet(
-        [(link.uri, tuple(link.messages)) for link in settings.links],
-        system_id=settings.mavlink.system_id,
+        terms_of(settings),
         component_id=settings.mavlink.component_id,
         room_yaw_deg=settings.room.room_yaw_deg,
         stopwatch=clocks.stopwatch,

@@ -9,10 +9,11 @@ from itertools import chain, islice
 from pathlib import Path
 
 from bridge.clock import Nanoseconds, StreamClock
+from bridge.dialogue import Terms
 from bridge.histogram import Histogram
 from bridge.links import open_link
 from bridge.monitor import Monitor
-from bridge.outlet import Outlet
+from bridge.outlet import DEFAULT_SYSTEM_ID, Outlet, Spout
 from bridge.pack import MESSAGES, Encoder, Identity, Packer
 from bridge.run import Outlets, close, run
 from bridge.settings import Settings
@@ -76,10 +77,12 @@ def measure_speed(settings: Settings, clocks: Clocks, cpu: CpuClocks, pairs: int
         names = tuple(camera.name for camera in footage.rig.cameras)
         run(chain(*islice(played, WARM_UP)), tracker, StreamClock(), Outlets(Outlet([], Packer(0.0)), Monitor(names)))
         packer = TimedPacker(settings.room.room_yaw_deg, stages)
-        identity = Identity(settings.mavlink.system_id, settings.mavlink.component_id)
+        identity = Identity(DEFAULT_SYSTEM_ID, settings.mavlink.component_id)
         link = TimedLink(open_link("memory:", Encoder(identity), clocks.stopwatch), stages)
         recorder = recorder_of(log, settings, footage.rig, {"source": "bench"}, clocks, block_when_full=True)
-        outlets = Outlets(Outlet([(link, MESSAGES)], packer), TimedMonitor(names, stages), recorder)
+        outlets = Outlets(
+            Outlet([Spout(link, Terms(messages=MESSAGES))], packer), TimedMonitor(names, stages), recorder
+        )
         clock = StreamClock()
         started = clocks.stopwatch(), cpu.process(), cpu.thread()
         try:

@@ -76,6 +76,10 @@ class TimedLink:
         """Return the bytes that came in since the last call."""
         return self._link.receive()
 
+    def listen(self, heard: Callable[[bytes], None]) -> None:
+        """Give what comes in to `heard`."""
+        self._link.listen(heard)
+
     def state(self) -> LinkState:
         """Return how the link fares."""
         return self._link.state()
