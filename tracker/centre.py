@@ -150,14 +150,11 @@ def _add_channel(
     normal[2] -= dot(T_v, T_v)
 
 
-@compiled(
-    "void(f8[:, ::1], Array(float32, 3, 'C', True), i8, i8, f8, f8, i8[:, ::1], i8, i8, f8[::1], f8[::1], f8[::1])"
-)
+@compiled("void(f8[:, ::1], Array(float32, 3, 'C', True), i8, f8, f8, i8[:, ::1], i8, i8, f8[::1], f8[::1], f8[::1])")
 def _linearise(
     pixels: Array,
     fine: NDArray[np.float32],
     per_px: int,
-    reach: int,
     drawn_px: float,
     radius_px: float,
     places: NDArray[np.int64],
@@ -178,7 +175,7 @@ def _linearise(
     factor, coefficients = np.empty((p + PLANE, p + PLANE)), np.empty((channels, p + PLANE))
     squares[:] = 0.0
     normal[:] = 0.0
-    read(fine, per_px, reach, drawn_px, radius_px, u_steps, v_steps, places, pixels, value, by_u, by_v)
+    read(fine, per_px, drawn_px, radius_px, u_steps, v_steps, places, pixels, value, by_u, by_v)
     _fill(pixels, value, model)
     _fit_linear(pixels, model, weight, factor, coefficients)
     for channel in range(channels):
@@ -206,12 +203,11 @@ def _doubt(squares: Array, channels: int, tukey: Array) -> None:
         tukey[i] = max(LEAST_WEIGHT, 1.0 - squares[i] / channels / (TUKEY**2 * scale))
 
 
-@compiled("f8[:, ::1](f8[:, ::1], Array(float32, 3, 'C', True), i8, i8, f8, f8, i8[:, ::1], i8, i8)")
+@compiled("f8[:, ::1](f8[:, ::1], Array(float32, 3, 'C', True), i8, f8, f8, i8[:, ::1], i8, i8)")
 def _slopes_at(
     pixels: Array,
     fine: NDArray[np.float32],
     per_px: int,
-    reach: int,
     drawn_px: float,
     radius_px: float,
     places: NDArray[np.int64],
@@ -223,7 +219,7 @@ def _slopes_at(
     value, by_u, by_v = np.empty((p, count)), np.empty((p, count)), np.empty((p, count))
     model, weight = np.empty((p + PLANE, count)), pixels[TRUST] ** 2
     factor, coefficients = np.empty((p + PLANE, p + PLANE)), np.empty((1, p + PLANE))
-    read(fine, per_px, reach, drawn_px, radius_px, u_steps, v_steps, places, pixels, value, by_u, by_v)
+    read(fine, per_px, drawn_px, radius_px, u_steps, v_steps, places, pixels, value, by_u, by_v)
     _fill(pixels, value, model)
     _fit_linear(pixels, model, weight, factor, coefficients)
     slopes = np.empty((2, count))
@@ -232,12 +228,11 @@ def _slopes_at(
     return slopes
 
 
-@compiled("f8(f8[:, ::1], Array(float32, 3, 'C', True), i8, i8, f8, f8, i8[:, ::1], i8, i8)")
+@compiled("f8(f8[:, ::1], Array(float32, 3, 'C', True), i8, f8, f8, i8[:, ::1], i8, i8)")
 def _squares_at(
     pixels: Array,
     fine: NDArray[np.float32],
     per_px: int,
-    reach: int,
     drawn_px: float,
     radius_px: float,
     places: NDArray[np.int64],
@@ -249,7 +244,7 @@ def _squares_at(
     value, by_u, by_v = np.empty((p, count)), np.empty((p, count)), np.empty((p, count))
     model, weight = np.empty((p + PLANE, count)), pixels[TRUST] ** 2
     factor, coefficients = np.empty((p + PLANE, p + PLANE)), np.empty((channels, p + PLANE))
-    read(fine, per_px, reach, drawn_px, radius_px, u_steps, v_steps, places, pixels, value, by_u, by_v)
+    read(fine, per_px, drawn_px, radius_px, u_steps, v_steps, places, pixels, value, by_u, by_v)
     _fill(pixels, value, model)
     _fit_linear(pixels, model, weight, factor, coefficients)
     total = 0.0
@@ -261,7 +256,7 @@ def _squares_at(
 
 
 @compiled(
-    "void(f8[:, ::1], f8[:, ::1], Array(float32, 3, 'C', True), Array(float32, 3, 'C', True), i8, i8, f8, f8,"
+    "void(f8[:, ::1], f8[:, ::1], Array(float32, 3, 'C', True), Array(float32, 3, 'C', True), i8, f8, f8,"
     "i8[:, ::1], f8, f8, f8[::1])"
 )
 def gauss_newton(
@@ -270,7 +265,6 @@ def gauss_newton(
     luma: NDArray[np.float32],
     chroma: NDArray[np.float32],
     per_px: int,
-    reach: int,
     drawn_px: float,
     radius_px: float,
     places: NDArray[np.int64],
@@ -291,8 +285,8 @@ def gauss_newton(
     misfit = det = 0.0
     for iteration in range(ITERATIONS):
         us, vs = max(-limit, min(limit, round(u * per_px))), max(-limit, min(limit, round(v * per_px)))
-        _linearise(bright, luma, per_px, reach, drawn_px, radius_px, places, us, vs, tukey_b, squares_b, normal)
-        _linearise(colour, chroma, per_px, reach, drawn_px, radius_px, places, us, vs, tukey_c, squares_c, normal_c)
+        _linearise(bright, luma, per_px, drawn_px, radius_px, places, us, vs, tukey_b, squares_b, normal)
+        _linearise(colour, chroma, per_px, drawn_px, radius_px, places, us, vs, tukey_c, squares_c, normal_c)
         misfit_b = _misfit(squares_b, tukey_b, 1, p, normal)
         misfit_c = _misfit(squares_c, tukey_c, 2, p, normal_c)
         misfit = (misfit_b * n_bright + misfit_c * 2 * n_colour) / (n_bright + 2 * n_colour)
@@ -329,12 +323,10 @@ def fit_centre(image: Image, ball: Expected) -> Centre | Reason:
     if not fits_in(image, extent):
         return Reason.AT_BORDER
     patch, streak_px, fit = cut(image, extent, ball.response), ball.streak_px, np.empty(6)
-    luma = template_for(ball.radius_px, ball.response.luma_px, ball.shades, extent.half, streak_px)
-    chroma = template_for(
-        ball.radius_px, ball.response.chroma_px, ball.shades, extent.half, streak_px, ball.response.block_px
-    )
+    luma = template_for(ball.radius_px, ball.response.luma_px, ball.shades)
+    chroma = template_for(ball.radius_px, ball.response.chroma_px, ball.shades, ball.response.block_px)
     n, places = luma.per_px, places_along(streak_px, luma.per_px)
-    shapes = luma.fine, chroma.fine, n, luma.reach, luma.radius_px
+    shapes = luma.fine, chroma.fine, n, luma.radius_px
     gauss_newton(patch.bright, patch.colour, *shapes, ball.radius_px, places, extent.du, extent.dv, fit)
     du, dv, cov_uu, cov_uv, cov_vv, misfit = fit.tolist()
     if not math.hypot(du - extent.du, dv - extent.dv) <= MAX_SHIFT_PX:
@@ -350,18 +342,17 @@ def misfit_at(patch: Patch, ball: Expected, centre: tuple[float, float], group: 
     """
     bright = group is Group.BRIGHTNESS
     blur_px, box_px = (ball.response.luma_px, 1) if bright else (ball.response.chroma_px, ball.response.block_px)
-    template = template_for(ball.radius_px, blur_px, ball.shades, extent_of(ball).half, ball.streak_px, box_px)
+    template = template_for(ball.radius_px, blur_px, ball.shades, box_px)
     n, places = template.per_px, places_along(ball.streak_px, template.per_px)
     u, v = (round(c * n) for c in centre)
     pixels = patch.bright if bright else patch.colour
-    return _squares_at(pixels, template.fine, n, template.reach, template.radius_px, ball.radius_px, places, u, v)
+    return _squares_at(pixels, template.fine, n, template.radius_px, ball.radius_px, places, u, v)
 
 
 def slopes_at(patch: Patch, ball: Expected, centre: tuple[float, float]) -> Array:
     """Return the slopes (2, n) of a ball's brightness, as fitted, by a given centre from the patch's middle [1/px]."""
-    half, streak_px = extent_of(ball).half, ball.streak_px
-    template = template_for(ball.radius_px, ball.response.luma_px, ball.shades, half, streak_px)
-    n, places = template.per_px, places_along(streak_px, template.per_px)
+    template = template_for(ball.radius_px, ball.response.luma_px, ball.shades)
+    n, places = template.per_px, places_along(ball.streak_px, template.per_px)
     u, v = (round(c * n) for c in centre)
-    drawn = template.fine, n, template.reach, template.radius_px
+    drawn = template.fine, n, template.radius_px
     return _slopes_at(patch.bright, *drawn, ball.radius_px, places, u, v)

@@ -56,13 +56,13 @@ def find_ball(
     streak_px = speed_px_s[0] * response.exposure_s, speed_px_s[1] * response.exposure_s
     edge_px = edge_of(radius_px, streak_px)
     half = math.ceil(edge_px + MARGIN_PX)
-    luma = template_for(radius_px, response.luma_px, shades, half, streak_px)
-    chroma = template_for(radius_px, response.chroma_px, shades, half, streak_px, response.block_px)
+    luma = template_for(radius_px, response.luma_px, shades)
+    chroma = template_for(radius_px, response.chroma_px, shades, response.block_px)
     fit = np.empty(8)
     status = _find_and_fit(
         image, colour.least_spread, colour.lowest_spread, colour.hues, *uv_px, *S, radius_px, edge_px, half,
         response.block_px, light_of(response.gamma), trust_of(response.gamma), luma.fine, chroma.fine, luma.per_px,
-        luma.reach, luma.radius_px, places_along(streak_px, luma.per_px), fit,
+        luma.radius_px, places_along(streak_px, luma.per_px), fit,
     )  # fmt: skip
     if status != _FOUND:
         return _REASONS[status]
@@ -73,14 +73,14 @@ def find_ball(
 
 @compiled(
     "i8(Array(u1, 3, 'C', True), Array(i2, 2, 'C', True), Array(i2, 1, 'C', True), Array(b1, 2, 'C', True), f8, f8,"
-    "f8, f8, f8, f8, f8, i8, i8, f8[::1], f8[::1], Array(f4, 3, 'C', True), Array(f4, 3, 'C', True), i8, i8, f8,"
+    "f8, f8, f8, f8, f8, i8, i8, f8[::1], f8[::1], Array(f4, 3, 'C', True), Array(f4, 3, 'C', True), i8, f8,"
     "i8[:, ::1], f8[::1])"
 )
 def _find_and_fit(
     image: Image, least_spread: NDArray[np.int16], lowest_spread: NDArray[np.int16], hues: NDArray[np.bool_],
     u: float, v: float, S_uu: float, S_uv: float, S_vv: float, radius_px: float, edge_px: float, half: int,
     block: int, light: Array, trust: Array, luma: NDArray[np.float32], chroma: NDArray[np.float32], per_px: int,
-    reach: int, drawn_px: float, places: NDArray[np.int64], fit: Array,
+    drawn_px: float, places: NDArray[np.int64], fit: Array,
 ) -> int:  # fmt: skip
     """Find the spot nearest the prediction, cut its pixels out and fit them.
 
@@ -109,7 +109,7 @@ def _find_and_fit(
         return _CUT_OFF
     du, dv = fit[6] - middle_u, fit[7] - middle_v
     bright, colour = cut_pixels(image, middle_u, middle_v, half, block, du, dv, edge_px, light, trust)
-    gauss_newton(bright, colour, luma, chroma, per_px, reach, drawn_px, radius_px, places, du, dv, fit)
+    gauss_newton(bright, colour, luma, chroma, per_px, drawn_px, radius_px, places, du, dv, fit)
     if not (fit[0] - du) ** 2 + (fit[1] - dv) ** 2 <= MAX_SHIFT_PX**2:
         return _RAN_AWAY
     fit[0] += middle_u
