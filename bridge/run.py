@@ -14,7 +14,7 @@ from typing import Protocol
 from bridge.clock import Clock
 from bridge.monitor import Monitor
 from bridge.outlet import Outlet
-from bridge.recorder import Recorder
+from bridge.recorder import RecorderState
 from bridge.status import Reading, StatusLine
 from bridge.summary import LogSummary, Summary
 from bridge.wire import Sent
@@ -31,13 +31,26 @@ class Steps(Protocol):
         """Give what was still held back when the events ended."""
 
 
+class Records(Protocol):
+    """What keeps every step: `bridge.recorder.Recorder`."""
+
+    def take(self, event: Event | None, step: Step, sent: tuple[Sent, ...], now_ns: int) -> None:
+        """Keep one turn of the loop."""
+
+    def state(self) -> RecorderState:
+        """Say how the recording stands."""
+
+    def close(self) -> None:
+        """End the recording properly."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Outlets:
     """Where a run's results go: the autopilots, the figures, and if wanted the log and the screen."""
 
     links: Outlet
     monitor: Monitor
-    recorder: Recorder | None = None
+    recorder: Records | None = None
     status: StatusLine | None = None
 
     def log_state(self) -> str:

@@ -33,6 +33,7 @@ from tools.simulate.helicopter import Helicopter
 from tools.simulate.mission import Mission
 from tools.simulate.verdict import Verdict, judge
 from tools.simulate.world import Surroundings, World
+from tools.steady import steady
 from tools.summary_file import write_summary
 from tracker.errors import OperatorError
 from tracker.rig import Rig
@@ -169,7 +170,8 @@ def _fly(
         clock: Clock = StreamClock() if fast else HostClock(clocks.monotonic, START_NS)
         events = source if fast else Paced(source, clock, clocks.sleep_s, clocks.stopwatch)
         try:
-            run(events, witness, clock, outlets)
+            with steady():
+                run(events, witness, clock, outlets)
         finally:
             close(clock, outlets)
     if isinstance(events, Paced) and events.worst_lag_ns > 1e9 / _RATE_HZ:

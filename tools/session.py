@@ -23,6 +23,7 @@ from bridge.status import StatusLine
 from bridge.summary import Summary, to_text
 from tools.open_source import OpenedSource, open_source
 from tools.request import Clocks, Pace, RunRequest
+from tools.steady import steady
 from tools.summary_file import check_summary_path, write_summary
 from tracker.errors import OperatorError
 from tracker.paper import PaperTracker
@@ -57,7 +58,9 @@ def run_session(request: RunRequest, clocks: Clocks) -> None:
         events, clock = _paced(opened, request.pace, clocks)
         refused = False
         try:
-            run(events, tracker_of(request.settings, opened.chosen.rig, clocks), clock, outlets)
+            tracker = tracker_of(request.settings, opened.chosen.rig, clocks)
+            with steady():
+                run(events, tracker, clock, outlets)
         except OperatorError:
             refused = True  # its one line says it all
             raise
