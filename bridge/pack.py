@@ -191,7 +191,7 @@ def message_id(name: str) -> int:
     return int(_CLASSES[name].id)
 
 
-def make_message(name: str, t_ns: int, slot: str = "", **fields: FieldValue) -> Message:
+def make_message(name: str, t_ns: int, slot: str = "", /, **fields: FieldValue) -> Message:
     """Return any message of the dialect; fields left out are zero, a text is cut to its field's length.
 
     Args:
@@ -200,8 +200,9 @@ def make_message(name: str, t_ns: int, slot: str = "", **fields: FieldValue) -> 
         KeyError: a name or field the dialect does not know.
     """
     dialect_class = _CLASSES[name]
-    known = zip(dialect_class.fieldnames, dialect_class.fieldtypes, dialect_class.array_lengths, strict=True)
-    whole = {field: _as_sent(fields.get(field), kind, length) for field, kind, length in known}
+    kinds = dict(zip(dialect_class.fieldnames, dialect_class.fieldtypes, strict=True))
+    known = zip(dialect_class.ordered_fieldnames, dialect_class.array_lengths, strict=True)  # in the wire's order
+    whole = {field: _as_sent(fields.get(field), kinds[field], length) for field, length in known}
     if unknown := fields.keys() - whole:
         raise KeyError(f"{name} has no field {', '.join(sorted(unknown))}")
     return Message(name, t_ns, 0, MappingProxyType(whole), slot)
@@ -238,9 +239,9 @@ class _Layout(NamedTuple):
 @cache
 def _layout(name: str) -> _Layout:
     dialect_class = _CLASSES[name]
-    number = dialect_class.id
+    number, names = dialect_class.id, tuple(dialect_class.ordered_fieldnames)
     return _Layout(
-        itemgetter(*dialect_class.ordered_fieldnames),
+        itemgetter(*names) if len(names) > 1 else lambda fields: (fields[names[0]],),
         dialect_class.unpacker.pack,
         number & 0xFFFF,
         number >> 16,

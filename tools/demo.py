@@ -27,7 +27,7 @@ from tools.demo_plot import draw_flight
 from tools.request import Clocks, DemoRequest, Pace
 from tools.seen_picture import draw_seen
 from tools.session import recorder_of, tracker_of
-from tools.simulate.autopilot import Mode
+from tools.simulate.autopilot.vessel import Mode
 from tools.simulate.flight import Flight, flight_of
 from tools.simulate.helicopter import Helicopter
 from tools.simulate.mission import Mission

@@ -33,4 +33,4 @@ class Announcer:
         self._said[matter] = text, now_ns
         if not text:
             return None
-        return make_message("STATUSTEXT", now_ns, slot=matter, severity=int(severity), text=f"posebridge: {text}")
+        return make_message("STATUSTEXT", now_ns, matter, severity=int(severity), text=f"posebridge: {text}")

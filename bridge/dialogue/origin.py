@@ -131,7 +131,7 @@ class OriginKeeper:
                 altitude=round(origin.altitude_m * 1000.0), time_usec=now_ns // 1000,
             )  # fmt: skip
         return make_message(
-            "COMMAND_INT", now_ns, slot="origin", target_system=peer.system_id, target_component=peer.component_id,
+            "COMMAND_INT", now_ns, "origin", target_system=peer.system_id, target_component=peer.component_id,
             frame=enum("MAV_FRAME_GLOBAL"), command=DO_SET_GLOBAL_ORIGIN, x=latitude, y=longitude, z=origin.altitude_m,
         )  # fmt: skip
 
@@ -156,6 +156,6 @@ class OriginKeeper:
 def _request(peer: Peer, name: str, now_ns: int) -> Message:
     """Ask for one message now."""
     return make_message(
-        "COMMAND_LONG", now_ns, slot=name, target_system=peer.system_id, target_component=peer.component_id,
+        "COMMAND_LONG", now_ns, name, target_system=peer.system_id, target_component=peer.component_id,
         command=enum("MAV_CMD_REQUEST_MESSAGE"), param1=float(message_id(name)),
     )  # fmt: skip

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common
 
 from bridge.ned import NedFrame, pose_jacobian, rotation_from_room, turned_triangle
-from bridge.pack import MESSAGES, Encoder, Identity, Packer, heartbeat
+from bridge.pack import MESSAGES, Encoder, Identity, Packer, Reader, heartbeat, make_message
 from tests.bridge.estimates import estimate, random_covariance
 from tests.bridge.mavlink_by_hand import ByHand, parse
 from tracker import so3
@@ -288,3 +288,20 @@ def test_an_identity_of_nobody_or_of_the_ground_station_is_refused(system_id: in
 def test_a_heading_that_is_no_number_is_refused() -> None:
     with pytest.raises(OperatorError, match="room_yaw_deg"):
         Packer(math.nan)
+
+
+@pytest.mark.parametrize("name", sorted(dialect_class.msgname for dialect_class in common.mavlink_map.values()))
+def test_every_message_of_the_dialect_can_be_made_with_nothing_in_it(name: str) -> None:
+    (received,) = Reader().feed(Encoder(IDENTITY)(make_message(name, 0), 0))
+    assert received.message == name
+    values = [each for value in received.fields.values() for each in (value if isinstance(value, list) else [value])]
+    assert set(values) <= {0, ""}
+
+
+def test_a_message_is_made_of_its_named_fields_and_no_other_name_is_taken() -> None:
+    made = make_message("PARAM_SET", 0, param_id="VISO_DELAY_MS_AND_MORE", param_value=0.1, target_system=3)
+    (received,) = Reader().feed(Encoder(IDENTITY)(made, 0))
+    assert received.fields["param_id"] == "VISO_DELAY_MS_AN"  # 16 bytes
+    assert received.fields == dict(made.fields)
+    with pytest.raises(KeyError, match="has no field value"):
+        make_message("PARAM_SET", 0, value=1.0)

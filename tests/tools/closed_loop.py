@@ -58,9 +58,9 @@ class ClosedLoop:
         if self.poses:
             noisy = R_BtoW @ so3.exp(self._rng.normal(0.0, 0.004, 3))
             p_noisy = p_BinW + self._rng.normal(0.0, 0.001, 3)
-            rest = np.zeros(3)
+            v_BinW = (p_BinW - self.world.pose_at(t_ns - 5_000_000)[0]) / 0.005 + self._rng.normal(0.0, 0.01, 3)
             estimate = Estimate(
-                t_ns, p_noisy, noisy, rest, rest, 1e-6 * np.eye(12), TrackState.TRACKING, self.reset_counter
+                t_ns, p_noisy, noisy, v_BinW, np.zeros(3), 1e-6 * np.eye(12), TrackState.TRACKING, self.reset_counter
             )
             for message in self._packer.messages(estimate, self._messages).values():
                 self._link.send(message)

@@ -9,7 +9,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from bridge.ned import rotation_from_room
-from tools.simulate.autopilot import Autopilot, Mode
+from tools.simulate.autopilot.imu import Imu, ImuNoise
+from tools.simulate.autopilot.navigation import Origin
+from tools.simulate.autopilot.parameters import FOR_VISION
+from tools.simulate.autopilot.vessel import Autopilot, Mode
 from tools.simulate.control import PilotSticks
 from tools.simulate.helicopter import Helicopter, State, Sticks, standing, step
 from tools.simulate.mission import Mission, Phase
@@ -20,6 +23,7 @@ from tracker.types import Array
 
 STEP_NS = 2_500_000
 TICK_STEPS = 8
+ORIGIN = Origin(473_978_000, 85_456_000, 488_000)
 _MEMORY_STEPS = 800
 
 
@@ -30,7 +34,8 @@ class Surroundings:
     floor_z_m: the floor in W: the volume of 1.5 m height has the room's origin in its middle.
     room_yaw_deg: heading of the room's x axis, as the bridge is told it [deg].
     gust_m_s, gust_memory_s: light draught, one sigma, and how long a gust lasts.
-    delay_ns: from mid-exposure until the frame is with the tracker; the autopilot is told it as its vision delay.
+    delay_ns: from mid-exposure until the frame is with the tracker; the autopilot is told it as its VISO_DELAY_MS.
+    origin: what a ground station tells the autopilot of where it is; None to leave that to the bridge.
     """
 
     floor_z_m: float = -0.75
@@ -38,6 +43,7 @@ class Surroundings:
     gust_m_s: float = 0.05
     gust_memory_s: float = 1.0
     delay_ns: int = 30_000_000
+    origin: Origin | None = ORIGIN
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,6 +76,7 @@ class World:
     history: list[Moment] = field(default_factory=list, init=False)
     autopilot: Autopilot = field(init=False)
     _wind: Wind = field(init=False)
+    _imu: Imu = field(init=False)
     _sticks: Sticks = field(default_factory=Sticks, init=False)
     _states: deque[tuple[int, State]] = field(default_factory=lambda: deque(maxlen=_MEMORY_STEPS), init=False)
     _steps: int = field(default=0, init=False)
@@ -79,7 +86,12 @@ class World:
         given = self.surroundings
         room_yaw = math.radians(given.room_yaw_deg)
         R_WtoN = rotation_from_room(room_yaw)
-        self.autopilot = Autopilot(lambda t_s: self.mission.reference_at(t_s).turned(R_WtoN, room_yaw), given.delay_ns)
+        self.autopilot = Autopilot(
+            lambda t_s: self.mission.reference_at(t_s).turned(R_WtoN, room_yaw),
+            {**FOR_VISION, "VISO_DELAY_MS": round(given.delay_ns / 1e6)},
+            origin=given.origin,
+        )
+        self._imu = Imu(ImuNoise(), np.random.default_rng((self.seed, 2)))
         self._wind = Wind(given.gust_m_s, given.gust_memory_s, STEP_NS / 1e9, np.random.default_rng((self.seed, 1)))
         place = self.mission.ground_inW
         self._states.append(
@@ -108,7 +120,9 @@ class World:
         """Move on by one step of the physics."""
         now_ns, state = self._states[-1]
         if self._steps % TICK_STEPS == 0:
-            self._sticks = _wired(self.autopilot.tick(now_ns))
+            before = self._states[max(len(self._states) - 1 - TICK_STEPS, 0)][1]
+            increment = self._imu.read(before, state, TICK_STEPS * STEP_NS / 1e9)
+            self._sticks = _wired(self.autopilot.tick(now_ns, increment))
             self._note(now_ns, state)
         wind = self._wind.blow()
         floor_z_m = self.surroundings.floor_z_m
