@@ -6,7 +6,7 @@ from collections import Counter, deque
 
 from bridge.histogram import Histogram
 from bridge.status import Reading
-from bridge.summary import LogSummary, Summary
+from bridge.summary import ClockOffset, LogSummary, Summary
 from bridge.wire import LinkState, Sent
 from tracker.types import Estimate, Event, Frame, Step, TrackState
 
@@ -95,7 +95,15 @@ class Monitor:
             links_up=sum(link.up for link in links),
             links=len(links),
             log=log,
+            clocks={name: offset for name, offset in self._clocks(shown).items() if offset.is_certain},
         )
+
+    def _clocks(self, estimate: Estimate | None) -> dict[str, ClockOffset]:
+        """Return the clocks of the cameras but the first as an estimate has them."""
+        if estimate is None:
+            return {}
+        offsets = zip(self._names, estimate.clock_offsets_s, estimate.clock_sigmas_s, strict=False)
+        return {name: ClockOffset(1e3 * float(offset), 1e3 * float(sigma)) for name, offset, sigma in [*offsets][1:]}
 
     def summary(self, links: tuple[LinkState, ...], log: LogSummary | None) -> Summary:
         """Return the figures of the run so far."""
@@ -110,6 +118,7 @@ class Monitor:
             rejected=dict(sorted(self._rejected.items())),
             lost=self._lost,
             resets=self._resets,
+            clocks=self._clocks(self._newest),
             links=links,
             log=log,
         )

@@ -35,6 +35,22 @@ NO_SAMPLES = Percentiles()
 
 
 @dataclass(frozen=True, slots=True)
+class ClockOffset:
+    """A camera's clock against the first camera's, and one sigma of that [ms]."""
+
+    offset_ms: float
+    sigma_ms: float
+
+    @property
+    def is_certain(self) -> bool:
+        """Say whether it is other than zero beyond three sigma."""
+        return abs(self.offset_ms) > 3.0 * self.sigma_ms
+
+    def __str__(self) -> str:
+        return f"{self.offset_ms:+.2f} +- {self.sigma_ms:.2f} ms"
+
+
+@dataclass(frozen=True, slots=True)
 class LogSummary:
     """The log: its file, records written, records dropped, and what ended it early, if anything did."""
 
@@ -54,6 +70,7 @@ class Summary:
     worst_gap_ms: longest stream time between two estimates sent in a row [ms]; None with fewer than two.
     frames: images seen, by camera name.  rejected: what was left out, by reason.
     lost: how often the track was lost.  resets: how often the estimate jumped.
+    clocks: how much later than its stamp each camera but the first saw, by the first one's clock, by camera name.
     """
 
     estimates_sent: int
@@ -65,6 +82,7 @@ class Summary:
     rejected: Mapping[str, int] = field(default_factory=_empty)
     lost: int = 0
     resets: int = 0
+    clocks: Mapping[str, ClockOffset] = field(default_factory=_empty)
     links: tuple[LinkState, ...] = ()
     log: LogSummary | None = None
 
@@ -81,6 +99,7 @@ def to_text(summary: Summary) -> RenderableType:
         _latencies(summary.latency_ms, summary.stages_ms),
         Text(f"frames      {_counts(summary.frames)}"),
         Text(f"rejected    {_counts(summary.rejected)}"),
+        *([Text(f"clocks      {_clocks(summary.clocks)}")] if summary.clocks else ()),
         *map(_link, summary.links),
         *(_log(log) for log in (summary.log,) if log is not None),
     )
@@ -113,6 +132,10 @@ def _link(link: LinkState) -> Text:
 def _log(log: LogSummary) -> Text:
     error = f", ended early: {log.error}" if log.error else ""
     return Text(f"log         {log.path}: {log.written} records, {log.dropped} dropped{error}")
+
+
+def _clocks(clocks: Mapping[str, ClockOffset]) -> str:
+    return ", ".join(f"{name} {offset}" for name, offset in clocks.items()) + " against the first camera's"
 
 
 def _counts(counts: Mapping[str, int]) -> str:
