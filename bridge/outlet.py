@@ -56,6 +56,7 @@ class Outlet:
         self._spouts = tuple(spouts)
         self._packer = packer
         self._received: deque[tuple[str, Received]] = deque(maxlen=_KEPT_MESSAGES)
+        self._now_ns = 0
 
     def listen(self, now: Nanoseconds) -> None:
         """Hear from now on what comes in. now: reads stream time [ns], from any thread."""
@@ -74,6 +75,7 @@ class Outlet:
         Returns:
             Records in the order of the links; links with a thread report a message in a later call.
         """
+        self._now_ns = now_ns
         for spout in self._spouts:
             self._received.extend((spout.link.name, message) for message in spout.hear())
             for message in spout.dialogue.due(step.state, now_ns):
@@ -91,9 +93,9 @@ class Outlet:
         """Return the messages that came in up to the last `send` and were not yet returned, with their link's URI."""
         return tuple(self._received.popleft() for _ in range(len(self._received)))
 
-    def dialogue_states(self, now_ns: int) -> tuple[DialogueState, ...]:
-        """Return what is known of each link's far end, in the links' order."""
-        return tuple(spout.dialogue.state(now_ns) for spout in self._spouts)
+    def far_ends(self) -> tuple[DialogueState, ...]:
+        """Return what was known of each link's far end at the last `send`, in the links' order."""
+        return tuple(spout.dialogue.state(self._now_ns) for spout in self._spouts)
 
     def link_states(self) -> tuple[LinkState, ...]:
         """Return how each link fares, in the order they were given."""

@@ -68,7 +68,7 @@ class Outlets:
         if self.recorder is not None and log_path is not None:
             state = self.recorder.state()
             log = LogSummary(log_path, state.written, state.dropped, state.error or "")
-        return self.monitor.summary(self.links.link_states(), log)
+        return self.monitor.summary(self.links.link_states(), log, self.links.far_ends())
 
 
 def run(events: Iterable[Event], tracker: Steps, clock: Clock, outlets: Outlets) -> None:
@@ -111,4 +111,4 @@ def _enter(event: Event | None, step: Step, sent: tuple[Sent, ...], now_ns: int,
 
 
 def _reading(outlets: Outlets) -> Reading:
-    return outlets.monitor.reading(outlets.links.link_states(), outlets.log_state())
+    return outlets.monitor.reading(outlets.links.link_states(), outlets.log_state(), outlets.links.far_ends())

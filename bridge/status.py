@@ -26,7 +26,8 @@ class Reading:
     latency_p50_ms, latency_p99_ms: frame available to datagram handed over [ms].
     position_m: x, y, z of the body in the room [m].  nis: of the last update, over its degrees of freedom.
     clocks: offsets of the cameras' clocks, those that are certainly not zero, by camera name.
-    links_up, links: how many links deliver, of how many.  log: the log's state in a word or two.
+    links_up, links: how many links deliver, of how many.  far_ends: the autopilots there, in a word or two each.
+    log: the log's state in a word or two.
     """
 
     state: str
@@ -38,6 +39,7 @@ class Reading:
     links_up: int
     links: int
     log: str
+    far_ends: tuple[str, ...] = ()
     clocks: Mapping[str, ClockOffset] = field(default_factory=lambda: MappingProxyType({}))
 
 
@@ -91,10 +93,11 @@ class StatusLine:
 def _line(reading: Reading) -> Text:
     position = "-" if reading.position_m is None else " ".join(f"{metres:+.3f}" for metres in reading.position_m)
     clocks = "".join(f"clock {name} {offset} | " for name, offset in reading.clocks.items())
+    far_ends = "".join(f" {far_end}" for far_end in reading.far_ends)
     return Text(
         f"{reading.state:<9} {reading.rate_hz:5.1f} Hz | latency p50 {_figure(reading.latency_p50_ms)} "
         f"p99 {_figure(reading.latency_p99_ms)} ms | x y z {position} m | NIS {_figure(reading.nis)} | "
-        f"{clocks}links {reading.links_up}/{reading.links} | log {reading.log}",
+        f"{clocks}links {reading.links_up}/{reading.links}{far_ends} | log {reading.log}",
         overflow="ellipsis",
         no_wrap=True,
     )

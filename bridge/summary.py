@@ -13,6 +13,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from bridge.dialogue import DialogueState
 from bridge.wire import LinkState
 
 
@@ -71,6 +72,7 @@ class Summary:
     frames: images seen, by camera name.  rejected: what was left out, by reason.
     lost: how often the track was lost.  resets: how often the estimate jumped.
     clocks: how much later than its stamp each camera but the first saw, by the first one's clock, by camera name.
+    far_ends: what is known of the autopilot at the end of each link.
     """
 
     estimates_sent: int
@@ -84,6 +86,7 @@ class Summary:
     resets: int = 0
     clocks: Mapping[str, ClockOffset] = field(default_factory=_empty)
     links: tuple[LinkState, ...] = ()
+    far_ends: tuple[DialogueState, ...] = ()
     log: LogSummary | None = None
 
 
@@ -100,7 +103,7 @@ def to_text(summary: Summary) -> RenderableType:
         Text(f"frames      {_counts(summary.frames)}"),
         Text(f"rejected    {_counts(summary.rejected)}"),
         *([Text(f"clocks      {_clocks(summary.clocks)}")] if summary.clocks else ()),
-        *map(_link, summary.links),
+        *map(_link, summary.links, summary.far_ends or ("",) * len(summary.links)),
         *(_log(log) for log in (summary.log,) if log is not None),
     )
 
@@ -123,10 +126,11 @@ def _latencies(total: Percentiles, stages: Mapping[str, Percentiles]) -> Table:
     return table
 
 
-def _link(link: LinkState) -> Text:
+def _link(link: LinkState, far_end: DialogueState | str) -> Text:
     state = "up" if link.up else f"down, {link.reason}"
+    far = f"\n            {far_end}" if far_end else ""
     superseded = f", {link.superseded} superseded" if link.superseded else ""
-    return Text(f"link        {link.name}: {state}, {link.sent} sent, {link.dropped} dropped{superseded}")
+    return Text(f"link        {link.name}: {state}, {link.sent} sent, {link.dropped} dropped{superseded}{far}")
 
 
 def _log(log: LogSummary) -> Text:

@@ -6,7 +6,7 @@ each turn     -> heartbeat, questions, and which estimates may go
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from bridge.dialogue.announce import Announcer, Severity
@@ -58,6 +58,31 @@ class DialogueState:
     too_old: int
     too_close: int
     strangers: int
+
+    @property
+    def brief(self) -> str:
+        """The far end in a word or two: the autopilot, whether it is silent, why it gets no poses."""
+        who = "" if self.peer is None else str(self.peer.autopilot) + (" SILENT" if self.away else "")
+        return ", ".join(word for word in (who, f"NO POSES, {self.holding}" if self.holding else "") if word)
+
+    def __str__(self) -> str:
+        """The far end in a line."""
+        return ", ".join(self._words())
+
+    def _words(self) -> Iterator[str]:
+        if self.peer is None:
+            yield "no autopilot heard"
+        else:
+            yield f"{self.peer.autopilot}, system {self.peer.system_id}" + (", SILENT" if self.away else "")
+            yield f"profile {self.profile}"
+        if self.origin:
+            yield f"origin {self.origin}"
+        if self.sync is not None:
+            settled = "" if self.sync.converged else ", settling"
+            yield f"clock {self.sync.offset_ns / 1e6:+.1f} +- {self.sync.spread_ms:.1f} ms{settled}"
+            yield f"round trip {self.sync.rtt_ms:.1f} ms"
+        counts = ((self.too_old, "too old"), (self.too_close, "too close"), (self.strangers, "messages of others"))
+        yield from (f"{count} {what}" for count, what in counts if count)
 
 
 class Dialogue:

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from bridge.monitor import Monitor
-from bridge.summary import LogSummary
+from bridge.summary import ClockOffset, LogSummary
 from bridge.wire import LinkState, Sent
 from tests.bridge.estimates import estimate, step
-from tracker.types import Frame, Reason, Rejected, Step, TrackState
+from tracker.types import Frame, Reason, Rejected, Step, TrackState, frozen_array
 
 IMAGE = np.zeros((2, 2, 3), np.uint8)
 PERIOD_NS = 66_666_667
