@@ -237,7 +237,7 @@ def speed(
     """Time tracking and acquisition with the frames in memory."""
     from bridge.settings import load_settings
     from tools.bench.commands import bench_speed
-    from tools.bench.speed import CpuClocks
+    from tools.bench.meter import CpuClocks
 
     cpu = CpuClocks(process=time.process_time_ns, thread=time.thread_time_ns)
     bench_speed(pairs, load_settings(config), _clocks(), cpu, json)

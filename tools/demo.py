@@ -18,7 +18,8 @@ from bridge.monitor import Monitor
 from bridge.outlet import Outlet, open_outlet
 from bridge.pace import Paced
 from bridge.run import Outlets, Steps, close, run
-from bridge.settings import DEFAULT_MESSAGES, Settings, load_settings, rig_of
+from bridge.settings import Settings, load_settings, rig_of
+from bridge.settings.terms import terms_of
 from bridge.status import StatusLine
 from bridge.summary import Summary, to_text
 from bridge.wire import Sent
@@ -32,6 +33,7 @@ from tools.simulate.helicopter import Helicopter
 from tools.simulate.mission import Mission
 from tools.simulate.verdict import Verdict, judge
 from tools.simulate.world import Surroundings, World
+from tools.steady import steady
 from tools.summary_file import write_summary
 from tracker.errors import OperatorError
 from tracker.rig import Rig
@@ -168,7 +170,8 @@ def _fly(
         clock: Clock = StreamClock() if fast else HostClock(clocks.monotonic, START_NS)
         events = source if fast else Paced(source, clock, clocks.sleep_s, clocks.stopwatch)
         try:
-            run(events, witness, clock, outlets)
+            with steady():
+                run(events, witness, clock, outlets)
         finally:
             close(clock, outlets)
     if isinstance(events, Paced) and events.worst_lag_ns > 1e9 / _RATE_HZ:
@@ -181,8 +184,7 @@ def _fly(
 def _outlet(settings: Settings, world: World, clocks: Clocks) -> Outlet:
     """Open the one link: to the simulated autopilot, in place of those the config names."""
     return open_outlet(
-        [(f"udpout:127.0.0.1:{world.autopilot.port}", DEFAULT_MESSAGES)],
-        system_id=settings.mavlink.system_id,
+        terms_of(settings.with_links((f"udpout:127.0.0.1:{world.autopilot.port}",))),
         component_id=settings.mavlink.component_id,
         room_yaw_deg=world.surroundings.room_yaw_deg,
         stopwatch=clocks.stopwatch,

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from bridge.monitor import Monitor
-from bridge.summary import LogSummary
+from bridge.summary import ClockOffset, LogSummary
 from bridge.wire import LinkState, Sent
 from tests.bridge.estimates import estimate, step
-from tracker.types import Frame, Reason, Rejected, Step, TrackState
+from tracker.types import Frame, Reason, Rejected, Step, TrackState, frozen_array
 
 IMAGE = np.zeros((2, 2, 3), np.uint8)
 PERIOD_NS = 66_666_667
@@ -141,3 +141,11 @@ def test_the_summary_passes_links_and_log_on() -> None:
 def test_an_hour_takes_no_more_memory_than_a_minute() -> None:
     one = flown(2000)
     assert len(one._recent) <= 32
+
+
+def test_clocks_are_told_by_camera_and_on_the_status_line_only_when_certain() -> None:
+    monitor = Monitor(("cam0", "cam1", "cam2"))
+    offsets, sigmas = frozen_array((0.0, 0.02, 0.0001)), frozen_array((0.0, 0.001, 0.0002))
+    monitor.take(None, step(replace(estimate(), clock_offsets_s=offsets, clock_sigmas_s=sigmas)), ())
+    assert monitor.summary((), None).clocks == {"cam1": ClockOffset(20.0, 1.0), "cam2": ClockOffset(0.1, 0.2)}
+    assert monitor.reading((), "off").clocks == {"cam1": ClockOffset(20.0, 1.0)}
