@@ -1,4 +1,4 @@
-"""The flight plan: parameters and origin, arm, take off, hover, a square, a landing; a step every 20 ms."""
+"""The flight plan: wait for origin and position, arm, take off, hover, a square, a landing; a step every 20 ms."""
 
 from __future__ import annotations
 
@@ -9,11 +9,10 @@ import numpy as np
 from bridge.ned import rotation_from_room
 from tools.simulate.autopilot.reports import GUIDED, LAND
 from tools.simulate.mission import Mission, Phase, Reference
-from tools.sitl.process import HOME
 from tools.sitl.world import World
 from tracker.errors import OperatorError
 
-SET_MODE, ARM, TAKE_OFF, SET_INTERVAL, SET_ORIGIN = 176, 400, 22, 511, 611
+SET_MODE, ARM, TAKE_OFF, SET_INTERVAL = 176, 400, 22, 511
 """MAV_CMD numbers."""
 
 RATES_HZ = {193: 10.0, 32: 25.0, 33: 2.0, 30: 25.0}
@@ -32,14 +31,13 @@ class Flight:
     """The ground station's part of a flight, as generators that are taken up again every 20 ms.
 
     mission: the path in the room.  room_yaw: heading of the room's x axis [rad].
-    gives_origin: False where the bridge does.
+    The origin is the bridge's to give; here it is awaited.
     """
 
-    def __init__(self, mission: Mission, room_yaw: float, gives_origin: bool = True) -> None:
+    def __init__(self, mission: Mission, room_yaw: float) -> None:
         self.mission = mission
         self._room_yaw = room_yaw
         self._R_WtoN = rotation_from_room(room_yaw)
-        self._gives_origin = gives_origin
         self.rotor_on = False
         self.marks_ns: dict[str, int] = {}
 
@@ -75,20 +73,8 @@ class Flight:
         for message, rate_hz in RATES_HZ.items():
             yield from self._command(world, SET_INTERVAL, message, 1e6 / rate_hz)
         yield from _until(world, lambda: _runs(world), 60.0, "EKF running")
-        if self._gives_origin:
-            yield from self._set_origin(world)
         yield from _until(world, lambda: _knows_position(world), 90.0, "EKF position")
         self._mark(world, "position")
-
-    def _set_origin(self, world: World) -> Iterator[None]:
-        latitude, longitude, altitude_m, _ = HOME
-        for _ in range(20):
-            world.ground.command_int(SET_ORIGIN, round(1e7 * latitude), round(1e7 * longitude), altitude_m)
-            yield from _wait(world, _RETRY_S)
-            if world.ground.acks.get(SET_ORIGIN) == 0:
-                self._mark(world, "origin")
-                return
-        raise FlightError(f"sitl: the origin was not taken (command 611 gives {world.ground.acks.get(SET_ORIGIN)})")
 
     def _arm(self, world: World) -> Iterator[None]:
         world.phase = "arm"

@@ -9,9 +9,6 @@ from pathlib import Path
 
 from tracker.errors import OperatorError
 
-HOME = (47.3978, 8.5456, 488.0, 0.0)
-"""Latitude, longitude [deg], altitude [m] and heading [deg] of the room's origin."""
-
 _PATIENCE_S = 5.0
 
 
@@ -27,8 +24,12 @@ class Wiring:
 class Simulator:
     """Run the binary in a folder of its own; its output goes to sitl.out there."""
 
-    def __init__(self, binary: Path, folder: Path, wiring: Wiring, parameters: str) -> None:
+    def __init__(
+        self, binary: Path, folder: Path, wiring: Wiring, home: tuple[float, float, float], parameters: str
+    ) -> None:
         """Start it, with all parameters at their defaults but those given.
+
+        home: latitude, longitude [deg] and altitude [m] of the room's origin.
 
         Raises:
             OperatorError: no program there, or one that does not start.
@@ -40,7 +41,7 @@ class Simulator:
         self.printed = folder / "sitl.out"
         with self.printed.open("wb") as out:
             self._process = subprocess.Popen(
-                [binary.resolve(), *arguments(wiring)],
+                [binary.resolve(), *arguments(wiring, home)],
                 cwd=folder,
                 stdin=subprocess.DEVNULL,
                 stdout=out,
@@ -57,7 +58,7 @@ class Simulator:
             self._process.wait()
 
 
-def arguments(wiring: Wiring) -> list[str]:
+def arguments(wiring: Wiring, home: tuple[float, float, float]) -> list[str]:
     """Return the simulator's command line.
 
     Serial ports are UDP clients: none listens, where `tcp:0` would be open to the whole network. `--speedup` is beyond
@@ -65,7 +66,7 @@ def arguments(wiring: Wiring) -> list[str]:
     """
     return [
         *("--model", "JSON:127.0.0.1", "--sim-port-out", str(wiring.physics)),
-        *("--speedup", "100", "-I0", "--wipe", "--home", ",".join(f"{each:g}" for each in HOME)),
+        *("--speedup", "100", "-I0", "--wipe", "--home", ",".join(f"{each:.7f}" for each in (*home, 0.0))),
         *("--defaults", "vision.parm"),
         *("--serial0", f"udpclient:127.0.0.1:{wiring.ground}"),
         *("--serial1", f"udpclient:127.0.0.1:{wiring.bridge}"),

@@ -20,6 +20,7 @@ from bridge.monitor import Monitor
 from bridge.outlet import open_outlet
 from bridge.run import Outlets, Steps, close, run
 from bridge.settings import Settings, load_settings, rig_of
+from bridge.settings.terms import terms_of
 from bridge.status import StatusLine
 from tools.request import Clocks
 from tools.session import recorder_of, tracker_of
@@ -36,13 +37,13 @@ from tools.sitl.relay import Relay
 from tools.sitl.report import SitlReport, flags_of, judge
 from tools.sitl.setup import parameter_file
 from tools.sitl.world import FLOOR_Z_M, World
+from tools.steady import steady
 from tracker.errors import OperatorError
 from tracker.sources.paths import Pose
 from tracker.sources.sim import START_NS, SimSource, SimTiming
 from tracker.types import Estimate, Event, Step
 
 LOG, REPORT = "sitl.mcap", "report.json"
-MESSAGES = ("VISION_POSITION_ESTIMATE", "VISION_SPEED_ESTIMATE")
 FRAMES = ("heli",)
 OWN, ARDUPILOT = "the project's simulated autopilot", "ArduPilot"
 _RATE_HZ, _LONGEST_S, _MISSION_S = 15.0, 600.0, 45.0
@@ -125,6 +126,7 @@ def _set_up(request: SitlRequest, settings: Settings, stack: ExitStack) -> tuple
     helicopter = Helicopter() if request.binary is None else VEHICLE
     mission = Mission(_MISSION_S, FLOOR_Z_M + helicopter.skid_m)
     flight = Flight(mission, math.radians(room_yaw_deg))
+    home = _home(settings)
     delay_ms = round(_CAMERA_DELAY_NS / 1e6)
     pilot: Own | ArduPilot
     if request.binary is None:
@@ -139,9 +141,17 @@ def _set_up(request: SitlRequest, settings: Settings, stack: ExitStack) -> tuple
     stack.callback(world.close)
     if isinstance(pilot, ArduPilot) and request.binary is not None:
         wiring = Wiring(pilot.port, ground.port, relay.far_port)
-        simulator = Simulator(request.binary, request.out, wiring, parameter_file(delay_ms, {}))
+        simulator = Simulator(request.binary, request.out, wiring, home, parameter_file(delay_ms, {}))
         stack.callback(simulator.close)
     return relay, flight, world
+
+
+def _home(settings: Settings) -> tuple[float, float, float]:
+    """Return latitude, longitude [deg] and altitude [m] of the room's origin, which the bridge tells the autopilot."""
+    origin = settings.origin
+    if origin is None:
+        raise OperatorError("sitl: the config names no [origin]; ArduPilot flies with none, so add one as in lab.toml")
+    return origin.latitude_deg, origin.longitude_deg, origin.altitude_m
 
 
 def _run(
@@ -160,8 +170,7 @@ def _run(
     source = stack.enter_context(SimSource(rig, world, clocks.stopwatch, timing, troubles=faults.troubles))
     witness = _Witness(tracker_of(settings, rig, clocks), world, faults)
     outlet = open_outlet(
-        [(f"udpout:127.0.0.1:{relay.bridge_port}", MESSAGES)],
-        system_id=settings.mavlink.system_id,
+        terms_of(settings.with_links((f"udpout:127.0.0.1:{relay.bridge_port}",))),
         component_id=settings.mavlink.component_id,
         room_yaw_deg=settings.room.room_yaw_deg,
         stopwatch=clocks.stopwatch,
@@ -172,7 +181,8 @@ def _run(
     status = stack.enter_context(StatusLine(console, clocks.stopwatch))
     outlets, clock = Outlets(outlet, monitor, recorder, status), StreamClock()
     try:
-        run(faults.events(_until_done(source, world)), witness, clock, outlets)
+        with steady():
+            run(faults.events(_until_done(source, world)), witness, clock, outlets)
     finally:
         close(clock, outlets)
     return witness, outlets
