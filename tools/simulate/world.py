@@ -22,7 +22,6 @@ from tracker.types import Array
 
 STEP_NS = 2_500_000
 TICK_STEPS = 8
-ORIGIN = Origin(473_978_000, 85_456_000, 488_000)
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,7 +32,7 @@ class Surroundings:
     room_yaw_deg: heading of the room's x axis, as the bridge is told it [deg].
     gust_m_s, gust_memory_s: light draught, one sigma, and how long a gust lasts.
     delay_ns: from mid-exposure until the frame is with the tracker; the autopilot is told it as its VISO_DELAY_MS.
-    origin: what a ground station tells the autopilot of where it is; None to leave that to the bridge.
+    origin: what a ground station tells the autopilot of where it is; None leaves that to the bridge.
     """
 
     floor_z_m: float = -0.75
@@ -41,7 +40,7 @@ class Surroundings:
     gust_m_s: float = 0.05
     gust_memory_s: float = 1.0
     delay_ns: int = 30_000_000
-    origin: Origin | None = ORIGIN
+    origin: Origin | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
