@@ -101,9 +101,12 @@ def test_only_one_module_imports_pymavlink() -> None:
     assert users == {"bridge/pack.py"}
 
 
-def test_only_the_links_and_the_simulated_autopilot_open_sockets_and_ports() -> None:
+def test_only_the_links_and_the_simulators_open_sockets_and_ports() -> None:
     users = {module.path for module in _modules(*ROOMS) if DEVICES & set(map(_top, module.imports()))}
-    strangers = {path for path in users if not path.startswith("bridge/links/")} - {"tools/simulate/autopilot/port.py"}
+    simulators = {"tools/simulate/autopilot/port.py"} | {
+        f"tools/sitl/{noun}.py" for noun in ("ground", "lockstep", "relay")
+    }
+    strangers = {path for path in users if not path.startswith("bridge/links/")} - simulators
     assert users
     assert not strangers
 

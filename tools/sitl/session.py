@@ -46,13 +46,16 @@ from tracker.types import Estimate, Event, Step
 LOG, REPORT = "sitl.mcap", "report.json"
 FRAMES = ("heli",)
 OWN, ARDUPILOT = "the project's simulated autopilot", "ArduPilot"
-_RATE_HZ, _LONGEST_S, _MISSION_S = 15.0, 600.0, 45.0
+_RATE_HZ, _LONGEST_S = 15.0, 600.0
 _CAMERA_DELAY_NS = 30_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class SitlRequest:
-    """One flight. binary: ArduPilot's program, None for the project's simulated autopilot.  out: folder for its files.
+    """One flight.
+
+    binary: ArduPilot's program, None for the project's simulated autopilot.  out: folder for its files.
+    faults: whether to rehearse them.  mission_s: time for take-off, hover, square, turn and landing together.
 
     Raises:
         OperatorError: a frame that there is none of.
@@ -63,6 +66,7 @@ class SitlRequest:
     config: str
     out: Path
     faults: bool
+    mission_s: float = 45.0
 
     def __post_init__(self) -> None:
         if self.frame not in FRAMES:
@@ -124,7 +128,7 @@ def _set_up(request: SitlRequest, settings: Settings, stack: ExitStack) -> tuple
     """Start the autopilot and wire it up."""
     room_yaw_deg = settings.room.room_yaw_deg
     helicopter = Helicopter() if request.binary is None else VEHICLE
-    mission = Mission(_MISSION_S, FLOOR_Z_M + helicopter.skid_m)
+    mission = Mission(request.mission_s, FLOOR_Z_M + helicopter.skid_m)
     flight = Flight(mission, math.radians(room_yaw_deg))
     home = _home(settings)
     delay_ms = round(_CAMERA_DELAY_NS / 1e6)
