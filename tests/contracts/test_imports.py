@@ -103,9 +103,7 @@ def test_only_one_module_imports_pymavlink() -> None:
 
 def test_only_the_links_and_the_simulators_open_sockets_and_ports() -> None:
     users = {module.path for module in _modules(*ROOMS) if DEVICES & set(map(_top, module.imports()))}
-    simulators = {"tools/simulate/autopilot/port.py"} | {
-        f"tools/sitl/{noun}.py" for noun in ("ground", "lockstep", "relay")
-    }
+    simulators = {"tools/simulate/autopilot/port.py"} | {f"tools/sitl/{noun}.py" for noun in ("lockstep", "wire")}
     strangers = {path for path in users if not path.startswith("bridge/links/")} - simulators
     assert users
     assert not strangers
