@@ -8,8 +8,8 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
-from bridge.summary import ClockOffset
 from bridge.status import Reading, StatusLine
+from bridge.summary import ClockOffset
 
 FRAME_NS = 66_666_667
 FLYING = Reading("tracking", 15.0, 3.14, 8.0, (0.1, -0.2, 1.0), 1.24, 1, 2, "ok")
