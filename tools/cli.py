@@ -20,6 +20,7 @@ from tracker.errors import OperatorError
 
 EXIT_PATH_NOT_HELD = 1
 EXIT_COLOURS_NOT_GOOD = 1
+EXIT_FLIGHT_NOT_GOOD = 1
 EXIT_OPERATOR = 2
 EXIT_INTERRUPTED = 130
 STDOUT = Path("-")
@@ -278,3 +279,28 @@ def rooms(
     from tools.bench.commands import bench_rooms
 
     bench_rooms(load_settings(config), seed, json)
+
+
+@app.command()
+def sitl(
+    binary: Annotated[
+        Path | None,
+        typer.Option(help="ArduPilot's SITL program (docs/sitl.md); else the project's simulated autopilot."),
+    ] = None,
+    frame: Annotated[str, typer.Option(help="The vehicle: heli.")] = "heli",
+    config: ConfigOption = "lab",
+    faults: Annotated[bool, typer.Option("--faults", help="Rehearse what may go wrong, in the air.")] = False,
+    out: Annotated[Path, typer.Option(help="Folder for log and report.", metavar="DIR")] = Path("logs/sitl"),
+) -> None:
+    """Fly an autopilot's own software on simulated cameras: origin, arming, hover, square, landing.
+
+    Exit code 0 only if every figure keeps its limit; else 1.
+    """
+    from tools.sitl.session import SitlRequest
+
+    request = SitlRequest(binary, frame, config, out, faults)
+
+    from tools.sitl.command import run_sitl
+
+    if not run_sitl(request, _clocks()).verdict.passed:
+        raise typer.Exit(EXIT_FLIGHT_NOT_GOOD)

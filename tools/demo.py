@@ -7,6 +7,7 @@ Nothing but those datagrams leads back to the helicopter.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -45,6 +46,10 @@ LOG, SUMMARY, VERDICT, PLOT, SEEN = "flight.mcap", "summary.json", "verdict.json
 DEMO_CONFIG = "lab"
 _RATE_HZ = 15.0
 _PATIENCE_NS = 3_600_000_000_000  # the world waits while this computer is busy, so a pose is never as old as it seems
+_TALK_S = 10.0
+"""At most so long may bridge and autopilot talk before the flight: of the origin, until the filter trusts the poses."""
+
+_REST_NS = 1_000_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,7 +159,7 @@ def _fly(
 ) -> tuple[_Witness, Summary]:
     """Run the loop once around."""
     rig = rig_of(settings, None).rig
-    timing = SimTiming(_RATE_HZ, request.duration_s, START_NS, delay_ns=world.surroundings.delay_ns)
+    timing = SimTiming(_RATE_HZ, request.duration_s + _TALK_S, START_NS, delay_ns=world.surroundings.delay_ns)
     log = request.out / LOG
     with ExitStack() as stack:
         source = stack.enter_context(SimSource(rig, world, clocks.stopwatch, timing, seed=request.seed))
@@ -169,7 +174,8 @@ def _fly(
         status = stack.enter_context(StatusLine(console, clocks.stopwatch))
         outlets = Outlets(outlet, monitor, recorder, status)
         clock: Clock = StreamClock() if fast else HostClock(clocks.monotonic, START_NS)
-        events = source if fast else Paced(source, clock, clocks.sleep_s, clocks.stopwatch)
+        frames = _until_landed(source, world)
+        events = frames if fast else Paced(frames, clock, clocks.sleep_s, clocks.stopwatch)
         try:
             with steady():
                 run(events, witness, clock, outlets)
@@ -180,6 +186,18 @@ def _fly(
         warning = f"posebridge: warning: up to {lag_ms:.0f} ms behind real time; this computer is busy or slow"
         console.print(warning, style="yellow", soft_wrap=True)
     return witness, outlets.summary(str(log))
+
+
+def _until_landed(source: SimSource, world: World) -> Iterator[Event]:
+    """Yield the frames until the vehicle has stood for a second after its landing."""
+    landed_ns: int | None = None
+    for event in source:
+        yield event
+        now_ns = world.history[-1].t_ns
+        if world.autopilot.mode is Mode.LANDED:
+            landed_ns = now_ns if landed_ns is None else landed_ns
+            if now_ns - landed_ns >= _REST_NS:
+                return
 
 
 def _outlet(settings: Settings, world: World, clocks: Clocks) -> Outlet:

@@ -19,7 +19,7 @@ STATE_SIZE = 15
 GRAVITY = 9.80665
 
 # The ground as spring, damper and friction: stiff enough to sink in by 5 mm only, soft enough for 2.5 ms steps.
-_GROUND_N_M, _GROUND_N_S_M, _FRICTION_N_S_M, _LEVELLING = 110.0, 2.5, 1.5, 6.0
+_GROUND_N_M, _GROUND_N_S_M, _FRICTION_N_S_M, _SETTLING = 110.0, 2.5, 1.5, 6.0
 _READONLY = "Array(f8, 1, 'C', readonly=True)"
 
 
@@ -35,7 +35,7 @@ def derivative(x: Array, R_start: Array, h: Array, told: Array, wind_inW: Array,
         wind_inW: (3,) [m/s].  floor_z_m: height of the floor in W [m].
     """
     mass, ixx, iyy, izz, cyclic_n_m, stiff, tilt_damping, yaw_damping, yaw_n_m = h[:9]
-    rotor_lag_s, lift_lag_s, heave, drag, skid_m = h[9:14]
+    rotor_lag_s, lift_lag_s, heave, drag, skid_m, levelling = h[9:15]
     turn, unused, R = np.empty((3, 3)), np.empty((3, 3)), np.zeros((3, 3))
     turn_into(x[6], x[7], x[8], turn, unused)
     for i in range(3):
@@ -47,7 +47,7 @@ def derivative(x: Array, R_start: Array, h: Array, told: Array, wind_inW: Array,
     for i in range(3):
         climb += R[i, 2] * (x[3 + i] - wind_inW[i])
     # A rotor at speed gives half the weight at least; with less it is running up or down and damps less too.
-    along_rotor_n = x[14] - heave * climb * min(2.0 * x[14] / weight_n, 1.0)
+    along_rotor_n = x[14] - heave * climb * max(min(2.0 * x[14] / weight_n, 1.0), 0.0)
     force = np.empty(3)
     for i in range(3):
         force[i] = along_rotor_n * R[i, 2] - drag * (x[3 + i] - wind_inW[i] - climb * R[i, 2])
@@ -60,11 +60,12 @@ def derivative(x: Array, R_start: Array, h: Array, told: Array, wind_inW: Array,
         pressed = min(press_n / weight_n, 1.0)
         force[0] -= _FRICTION_N_S_M * pressed * x[3]
         force[1] -= _FRICTION_N_S_M * pressed * x[4]
-    firm = 1.0 + _LEVELLING * pressed
+    firm = 1.0 + _SETTLING * pressed
+    righting = stiff + levelling * pressed
     # z_B x up, the turn that rights the body, is (-up_y, up_x, 0) in B, up being R's last row.
     wx, wy, wz = x[9], x[10], x[11]
-    mx = cyclic_n_m * x[12] - stiff * firm * R[2, 1] - tilt_damping * firm * wx - (izz - iyy) * wy * wz
-    my = cyclic_n_m * x[13] + stiff * firm * R[2, 0] - tilt_damping * firm * wy - (ixx - izz) * wz * wx
+    mx = cyclic_n_m * x[12] - righting * R[2, 1] - tilt_damping * firm * wx - (izz - iyy) * wy * wz
+    my = cyclic_n_m * x[13] + righting * R[2, 0] - tilt_damping * firm * wy - (ixx - izz) * wz * wx
     mz = yaw_n_m * told[2] * (1.0 - pressed) - yaw_damping * firm * wz - (iyy - ixx) * wx * wy
     for i in range(3):
         dx[i] = x[3 + i]

@@ -29,7 +29,7 @@ class Helicopter:
     collective_share: change of lift at full stick, as a share of the weight.
     heave_damping_n_s_m: loss of lift per climb rate, along the rotor's axis.  drag_n_s_m: force per level air speed.
     trim: cyclic about x and y, yaw and collective that are always there, as of a vehicle never quite in trim.
-    skid_m: height of B's origin above the ground when it stands.
+    skid_m: height of B's origin above the ground when it stands.  levelling_n_m: how hard the skids right it there.
     """
 
     mass_kg: float = 0.055
@@ -46,10 +46,11 @@ class Helicopter:
     drag_n_s_m: float = 0.122
     trim: tuple[float, float, float, float] = (0.03, -0.02, 0.02, -0.03)
     skid_m: float = 0.058
+    levelling_n_m: float = 0.048
 
     @cached_property
     def values(self) -> Array:
-        """Return the values as `dynamics.derivative` wants them (14,)."""
+        """Return the values as `dynamics.derivative` wants them (15,)."""
         return frozen_array(
             [
                 self.mass_kg,
@@ -64,6 +65,7 @@ class Helicopter:
                 self.heave_damping_n_s_m,
                 self.drag_n_s_m,
                 self.skid_m,
+                self.levelling_n_m,
             ]
         )
 
