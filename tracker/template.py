@@ -149,8 +149,8 @@ def _draw(radius_steps: int, blur_steps: int, box_px: int, shades: Shades) -> Te
     kernel = _kernel(per_px, blur_steps, box_px)
     count = math.ceil(radius_px * per_px) + len(kernel) // 2 + 2
     drawn = _sharp(per_px, radius_px, count, np.array(shades.lamp), np.array(shades.weights))
-    fine = cv2.sepFilter2D(drawn, -1, kernel, kernel, borderType=cv2.BORDER_CONSTANT)
-    fine = fine.reshape(*drawn.shape)  # OpenCV drops a single channel's axis
+    blurred = cv2.sepFilter2D(drawn, -1, kernel, kernel, borderType=cv2.BORDER_CONSTANT)
+    fine = blurred.astype(np.float32, copy=False).reshape(drawn.shape)  # OpenCV drops a single channel's axis
     fine.flags.writeable = False
     return Template(fine, per_px, radius_px)
 
