@@ -87,6 +87,12 @@ def _clocks() -> Clocks:
     return Clocks(monotonic=time.monotonic_ns, stopwatch=time.perf_counter_ns, wall=time.time_ns, sleep_s=time.sleep)
 
 
+def _tell_of_compiling() -> None:
+    from tools.first_start import tell_of_compiling
+
+    tell_of_compiling(lambda line: typer.echo(f"posebridge: {line}", err=True))
+
+
 def _print_version(wanted: bool) -> None:
     if wanted:
         try:
@@ -132,6 +138,7 @@ def run(
     quiet: Annotated[bool, typer.Option("--quiet", help="Show no status line and no summary.")] = False,
 ) -> None:
     """Track the vehicle and send its pose to the autopilot; Ctrl-C ends it."""
+    _tell_of_compiling()
     from bridge.settings import load_settings
 
     settings = load_settings(config).with_links(tuple(link or ()))
@@ -157,6 +164,7 @@ def demo(
     """
     request = DemoRequest(duration_s, seed, out, pace)
 
+    _tell_of_compiling()
     from tools.demo import run_demo
 
     if not run_demo(request, _clocks()).verdict.passed:
@@ -208,6 +216,7 @@ def colours(
 
     Carry the vehicle slowly through the room meanwhile. Exit code 1 when the colours are not good to fly with.
     """
+    _tell_of_compiling()
     from tools.colours.command import ColoursRequest, run_colours
 
     request = ColoursRequest(config, source, frames, picture, write, overwrite, json)
@@ -222,6 +231,7 @@ def accuracy(
     json: JsonOption = False,
 ) -> None:
     """Compare estimates with the truth, by the filter and by the paper's own method."""
+    _tell_of_compiling()
     from bridge.settings import load_settings
     from tools.bench.commands import bench_accuracy
 
@@ -235,6 +245,7 @@ def speed(
     json: JsonOption = False,
 ) -> None:
     """Time tracking and acquisition with the frames in memory."""
+    _tell_of_compiling()
     from bridge.settings import load_settings
     from tools.bench.commands import bench_speed
     from tools.bench.meter import CpuClocks
@@ -250,6 +261,7 @@ def memory(
     json: JsonOption = False,
 ) -> None:
     """Watch the process's size over a long run with link and log."""
+    _tell_of_compiling()
     from bridge.settings import load_settings
     from tools.bench.commands import bench_memory
 
@@ -263,6 +275,7 @@ def consistency(
     json: JsonOption = False,
 ) -> None:
     """Fly many simulated flights and see whether the filter's covariance is true."""
+    _tell_of_compiling()
     from tools.bench.commands import bench_consistency
 
     bench_consistency(seeds, gamma, json)
@@ -275,6 +288,7 @@ def rooms(
     json: JsonOption = False,
 ) -> None:
     """Track simulated flights in other light, through other cameras, at other speeds."""
+    _tell_of_compiling()
     from bridge.settings import load_settings
     from tools.bench.commands import bench_rooms
 

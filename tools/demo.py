@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rich.console import Console
@@ -45,6 +45,7 @@ from tracker.types import Estimate, Event, Frame, Step
 LOG, SUMMARY, VERDICT, PLOT, SEEN = "flight.mcap", "summary.json", "verdict.json", "flight.png", "seen.png"
 DEMO_CONFIG = "lab"
 _RATE_HZ = 15.0
+_PATIENCE_NS = 3_600_000_000_000  # the world waits while this computer is busy, so a pose is never as old as it seems
 _TALK_S = 10.0
 """At most so long may bridge and autopilot talk before the flight: of the origin, until the filter trusts the poses."""
 
@@ -201,8 +202,9 @@ def _until_landed(source: SimSource, world: World) -> Iterator[Event]:
 
 def _outlet(settings: Settings, world: World, clocks: Clocks) -> Outlet:
     """Open the one link: to the simulated autopilot, in place of those the config names."""
+    ((_, terms),) = terms_of(settings.with_links(("demo",)))
     return open_outlet(
-        terms_of(settings.with_links((f"udpout:127.0.0.1:{world.autopilot.port}",))),
+        [(f"udpout:127.0.0.1:{world.autopilot.port}", replace(terms, max_age_ns=_PATIENCE_NS))],
         component_id=settings.mavlink.component_id,
         room_yaw_deg=world.surroundings.room_yaw_deg,
         stopwatch=clocks.stopwatch,

@@ -9,10 +9,9 @@ import numpy as np
 
 from tracker.centre import Group, misfit_at, slopes_at
 from tracker.compiled import compiled
-from tracker.disc import GLOSS, TERMS
 from tracker.patch import LUMA, TRUST, Expected, Patch, Response, X, Y
 from tracker.solve import eliminate
-from tracker.template import BLUR_STEP_PX, Vector, every_term, places_along, read, template_for
+from tracker.template import BLUR_STEP_PX, GLOSS, TERMS, Vector, every_term, places_along, read, template_for
 from tracker.types import Array
 
 BLUR_MAX_PX = 1.5

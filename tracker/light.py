@@ -12,8 +12,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tracker.disc import GLOSS, TERMS
-from tracker.template import Shades, Vector
+from tracker.template import GLOSS, TERMS, Shades, Vector
 from tracker.types import Array
 
 FORGETTING = 0.99  # a ball: the light of about the last hundred counts

@@ -144,8 +144,15 @@ def test_an_hour_takes_no_more_memory_than_a_minute() -> None:
 
 
 def test_clocks_are_told_by_camera_and_on_the_status_line_only_when_certain() -> None:
-    monitor = Monitor(("cam0", "cam1", "cam2"))
-    offsets, sigmas = frozen_array((0.0, 0.02, 0.0001)), frozen_array((0.0, 0.001, 0.0002))
-    monitor.take(None, step(replace(estimate(), clock_offsets_s=offsets, clock_sigmas_s=sigmas)), ())
-    assert monitor.summary((), None).clocks == {"cam1": ClockOffset(20.0, 1.0), "cam2": ClockOffset(0.1, 0.2)}
-    assert monitor.reading((), "off").clocks == {"cam1": ClockOffset(20.0, 1.0)}
+    watch = Monitor(("cam0", "cam1", "cam2"))
+    offsets, sigmas = frozen_array((0.0, 0.5, 0.125)), frozen_array((0.0, 0.125, 0.25))
+    watch.take(None, step(replace(estimate(), clock_offsets_s=offsets, clock_sigmas_s=sigmas)), ())
+    assert watch.summary((), None).clocks == {"cam1": ClockOffset(500.0, 125.0), "cam2": ClockOffset(125.0, 250.0)}
+    assert watch.reading((), "off").clocks == {"cam1": ClockOffset(500.0, 125.0)}
+
+
+def test_clocks_that_are_not_estimated_are_not_told() -> None:
+    watch = monitor()
+    watch.take(None, step(estimate()), ())
+    assert watch.summary((), None).clocks == {}
+    assert watch.reading((), "off").clocks == {}

@@ -139,3 +139,23 @@ def test_a_reboot_of_the_autopilot_starts_the_matter_of_the_origin_anew() -> Non
         answer = reply(request, now_ns + 2_000_000, far_ns)
         dialogue.take([replace(answer, system_id=3)])
     assert not dialogue.admits(estimate(t_ns=now_ns), now_ns)
+
+
+def test_what_is_known_of_the_far_end_is_told_in_a_line_and_in_a_word() -> None:
+    assert str(Dialogue(Terms()).state(BASE_NS)) == "no autopilot heard"
+    dialogue = met("ARDUPILOTMEGA", Terms(origin=PLACE))
+    waiting = dialogue.state(BASE_NS)
+    assert waiting.brief == "ArduPilot, NO POSES, origin: asking the autopilot whether it has one"
+    assert str(waiting).startswith("ArduPilot, system 3, profile ardupilot, origin asking")
+    dialogue.take(
+        [from_autopilot("GPS_GLOBAL_ORIGIN", BASE_NS, system_id=3, latitude=321_000_000, longitude=348_000_000)]
+    )
+    now_ns = BASE_NS + 1_000_000_000
+    (request,) = (m for m in dialogue.due(TrackState.TRACKING, now_ns) if m.name == "TIMESYNC")
+    dialogue.take([replace(reply(request, now_ns + 4_000_000, 1_002_000_000), system_id=3)])
+    assert not dialogue.admits(estimate(t_ns=0), now_ns)
+    assert str(dialogue.state(now_ns)) == (
+        "ArduPilot, system 3, profile ardupilot, origin set, clock +5000.0 +- 0.0 ms, settling, round trip 4.0 ms, "
+        "1 too old"
+    )
+    assert dialogue.state(now_ns + 5_000_000_000).brief == "ArduPilot SILENT"
