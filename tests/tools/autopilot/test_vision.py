@@ -14,7 +14,7 @@ from tools.simulate.autopilot.jitter import MESSAGES, MOST_LAG_US, JitterCorrect
 from tools.simulate.autopilot.parameters import FOR_VISION, Parameters
 from tools.simulate.autopilot.vision import PoseSample, SpeedSample, VisionSensor
 
-FRD = {"frame_id": 20, "child_frame_id": 12, "q": [1.0, 0.0, 0.0, 0.0]}
+FRD: dict[str, FieldValue] = {"frame_id": 20, "child_frame_id": 12, "q": [1.0, 0.0, 0.0, 0.0]}
 
 
 def received(name: str, **fields: FieldValue) -> Received:
@@ -30,7 +30,7 @@ class Sensor:
         self.clock = JitterCorrection()
 
     def take(
-        self, name: str, at_ms: float, late_ms: float = 0.0, **fields: FieldValue
+        self, name: str, at_ms: float, late_ms: float = 0.0, /, **fields: FieldValue
     ) -> tuple[PoseSample | SpeedSample, ...]:
         stamp = "time_usec" if name in ("ATT_POS_MOCAP", "ODOMETRY") else "usec"
         message = received(name, **{stamp: round(1000 * at_ms), **fields})
@@ -78,7 +78,7 @@ def test_samples_less_than_20_ms_apart_are_dropped_whatever_message_brings_them(
 def test_a_stamp_that_goes_back_is_taken() -> None:
     sensor = Sensor()
     sensor.take("VISION_POSITION_ESTIMATE", 2000)
-    assert pose_of(sensor.take("VISION_POSITION_ESTIMATE", 1900, late_ms=100)).t_ms == 1900
+    assert pose_of(sensor.take("VISION_POSITION_ESTIMATE", 1900, 100)).t_ms == 1900
 
 
 @pytest.mark.parametrize("counter", [1, 255, 7])
@@ -105,7 +105,7 @@ def test_the_sigma_is_the_root_of_the_sum_of_variances_and_no_less_than_the_nois
 def test_odometry_counts_only_in_local_and_body_frd_and_its_velocity_is_the_bodys() -> None:
     sensor = Sensor()
     half = math.sqrt(0.5)
-    east = {**FRD, "q": [half, 0.0, 0.0, half], "vx": 1.0}  # nose to the east, going forward
+    east: dict[str, FieldValue] = {**FRD, "q": [half, 0.0, 0.0, half], "vx": 1.0}  # nose to the east, going forward
     pose, speed = sensor.take("ODOMETRY", 1000, **east)
     assert isinstance(pose, PoseSample)
     assert isinstance(speed, SpeedSample)
