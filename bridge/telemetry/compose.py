@@ -100,10 +100,12 @@ def snapshot_of(
         ),
         rejected=dict(summary.rejected),
         links=tuple(replace(link, name=_short(link.name), reason=_short(link.reason)) for link in around.links[:MANY]),
-        log=None if around.log is None else replace(around.log, path=_short(around.log.path)),
+        log=None
+        if around.log is None
+        else replace(around.log, path=_short(around.log.path), error=_short(around.log.error)),
         far_ends=around.far_ends[:MANY],
         history=_history(gauges.bins.last(KEPT)),
-        alarms=tuple(replace(alarm, cause=_short(alarm.cause), remedy=_short(alarm.remedy)) for alarm in alarms[:MANY]),
+        alarms=tuple(_short_alarm(alarm) for alarm in alarms[:MANY]),
     )
 
 
@@ -209,6 +211,10 @@ def _history(bins: Sequence[Bin]) -> page.History:
         latency_ms=tuple(round(each.latency_ns / 1e6, 3) if each.latency_ns else None for each in bins),
         nis_ratio=tuple(each.nis / each.dof if each.dof else None for each in bins),
     )
+
+
+def _short_alarm(alarm: Alarm) -> Alarm:
+    return replace(alarm, subject=_short(alarm.subject), cause=_short(alarm.cause), remedy=_short(alarm.remedy))
 
 
 def _short(text: str) -> str:
