@@ -14,7 +14,7 @@ from typing import Protocol
 from bridge.clock import Clock
 from bridge.monitor import Monitor
 from bridge.outlet import Outlet
-from bridge.recorder import Recorder
+from bridge.recorder import RecorderState
 from bridge.status import Reading, StatusLine
 from bridge.summary import LogSummary, Summary
 from bridge.wire import Sent
@@ -31,13 +31,26 @@ class Steps(Protocol):
         """Give what was still held back when the events ended."""
 
 
+class Records(Protocol):
+    """What keeps every step: `bridge.recorder.Recorder`."""
+
+    def take(self, event: Event | None, step: Step, sent: tuple[Sent, ...], now_ns: int) -> None:
+        """Keep one turn of the loop."""
+
+    def state(self) -> RecorderState:
+        """Say how the recording stands."""
+
+    def close(self) -> None:
+        """End the recording properly."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Outlets:
     """Where a run's results go: the autopilots, the figures, and if wanted the log and the screen."""
 
     links: Outlet
     monitor: Monitor
-    recorder: Recorder | None = None
+    recorder: Records | None = None
     status: StatusLine | None = None
 
     def log_state(self) -> str:
@@ -55,7 +68,7 @@ class Outlets:
         if self.recorder is not None and log_path is not None:
             state = self.recorder.state()
             log = LogSummary(log_path, state.written, state.dropped, state.error or "")
-        return self.monitor.summary(self.links.link_states(), log)
+        return self.monitor.summary(self.links.link_states(), log, self.links.far_ends())
 
 
 def run(events: Iterable[Event], tracker: Steps, clock: Clock, outlets: Outlets) -> None:
@@ -65,6 +78,7 @@ def run(events: Iterable[Event], tracker: Steps, clock: Clock, outlets: Outlets)
         events: frames in the order they are to be worked on.
         clock: stream time, in the base of the frames' own.
     """
+    outlets.links.listen(clock.now_ns)
     for event in events:
         if not isinstance(event, Rejected):
             clock.follow(event)
@@ -97,4 +111,4 @@ def _enter(event: Event | None, step: Step, sent: tuple[Sent, ...], now_ns: int,
 
 
 def _reading(outlets: Outlets) -> Reading:
-    return outlets.monitor.reading(outlets.links.link_states(), outlets.log_state())
+    return outlets.monitor.reading(outlets.links.link_states(), outlets.log_state(), outlets.links.far_ends())
