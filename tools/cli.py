@@ -301,6 +301,10 @@ def sitl(
         Path | None,
         typer.Option(help="ArduPilot's SITL program (docs/sitl.md); else the project's simulated autopilot."),
     ] = None,
+    connect: Annotated[
+        str | None,
+        typer.Option(help="tcp:HOST:PORT of SERIAL0 of ArduPilot's SITL that runs already.", metavar="URI"),
+    ] = None,
     frame: Annotated[str, typer.Option(help="The vehicle: heli.")] = "heli",
     config: ConfigOption = "lab",
     faults: Annotated[bool, typer.Option("--faults", help="Rehearse what may go wrong, in the air.")] = False,
@@ -312,7 +316,7 @@ def sitl(
     """
     from tools.sitl.session import SitlRequest
 
-    request = SitlRequest(binary, frame, config, out, faults)
+    request = SitlRequest(binary, frame, config, out, faults, connect=connect)
 
     from tools.sitl.command import run_sitl
 

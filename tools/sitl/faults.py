@@ -10,22 +10,28 @@ import numpy as np
 from tools.simulate.autopilot.reports import LAND
 from tools.sitl.flight import Flight
 from tools.sitl.relay import Relay
-from tools.sitl.world import World
+from tools.sitl.world import Sample, World
 from tracker.scene.trouble import NO_TROUBLE, Occluder, Trouble
 from tracker.types import Array, Estimate, Event, Frame, Step, frozen_array
 
-_SETTLE_S, _WATCH_S = 4.0, 6.0
+_SETTLE_S, _WATCH_S = 3.0, 5.0
+_ARRIVAL_S = 0.5
+"""Within this after a switch the autopilot need not have heard of it."""
+
 _WHOLE_PICTURE = (0, 0, 8192, 8192)
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """One thing that goes wrong for `lasts_s`.  steers: whether targets go on being sent meanwhile."""
+    """One thing that goes wrong for `lasts_s`.
+
+    moves_mm: how far a vehicle that rightly believes its poses goes: to where they say the target is.
+    """
 
     name: str
     what: str
     lasts_s: float
-    steers: bool = True
+    moves_mm: float = 0.0
 
 
 FAULTS = (
@@ -34,7 +40,7 @@ FAULTS = (
     Fault("dropout", "no frames from any camera", 0.6),
     Fault("clock step", "the host's calendar set back by an hour", 2.0),
     Fault("packet loss", "three of ten datagrams lost, both ways", 5.0),
-    Fault("jump", "pose 0.3 m aside, told by reset_counter", 5.0, steers=False),
+    Fault("jump", "pose 0.3 m aside, told by reset_counter", 5.0, moves_mm=300.0),
 )
 
 
@@ -42,7 +48,7 @@ FAULTS = (
 class Outcome:
     """What a fault did.
 
-    excursion_mm: farthest from where the vehicle stood when it began, the quiet hover's own before it in `quiet_mm`.
+    excursion_mm: farthest from where the vehicle stood when it began.  quiet_mm: the same of the quiet hover before.
     ekf_error_mm: the autopilot's worst error of its own position, in the frame it is told.  worst_ratio: of its
     EKF_STATUS_REPORT.  failsafe: whether it left guided flight.  texts: what it said.
     """
@@ -101,17 +107,18 @@ class Faults:
         world.phase = fault.name
         said, first = len(world.ground.texts), len(world.history)
         self._switch(fault, on=True)
-        yield from flight.hold(world, fault.lasts_s, steers=fault.steers)
+        yield from flight.hold(world, fault.lasts_s)
         self._switch(fault, on=False)
-        yield from flight.hold(world, _WATCH_S, steers=fault.steers)
+        yield from flight.hold(world, _WATCH_S)
         samples = world.history[first:]
         place = samples[0].p_BinW
+        errors_mm = _errors_mm(samples, (0.0, fault.lasts_s) if fault.moves_mm else ())
         self.outcomes.append(
             Outcome(
                 fault,
                 quiet_mm,
                 max(1e3 * float(np.linalg.norm(each.p_BinW - place)) for each in samples),
-                max((each.ekf_error_mm for each in samples if each.ekf_error_mm is not None), default=0.0),
+                max(errors_mm, default=0.0),
                 max(each.worst_ratio for each in samples),
                 any(each.mode == LAND for each in samples),
                 tuple(text for _, text in world.ground.texts[said:]),
@@ -133,6 +140,17 @@ class Faults:
     def shift_inW(self) -> Array:
         """Return how far aside poses are told now [m]."""
         return self._shift_inW
+
+
+def _errors_mm(samples: list[Sample], switched_s: tuple[float, ...]) -> list[float]:
+    """Return the autopilot's errors, but for those just after poses went aside or back, before it can have heard."""
+    errors_mm = []
+    for sample in samples:
+        t_s = (sample.t_ns - samples[0].t_ns) / 1e9
+        unheard = any(0.0 <= t_s - at_s < _ARRIVAL_S for at_s in switched_s)
+        if sample.ekf_error_mm is not None and not unheard:
+            errors_mm.append(sample.ekf_error_mm)
+    return errors_mm
 
 
 def _reach_mm(world: World, samples: int) -> float:

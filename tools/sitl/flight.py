@@ -56,14 +56,13 @@ class Flight:
         yield from self._follow(world, Phase.TURN)
         yield from self._land(world)
 
-    def hold(self, world: World, seconds: float, *, steers: bool = True) -> Iterator[None]:
-        """Stay at the mission's home point for a while. steers: whether the target is sent again and again."""
+    def hold(self, world: World, seconds: float) -> Iterator[None]:
+        """Stay at the mission's home point for a while."""
         start, _ = self.mission.span_s(Phase.HOVER)
         reference = self.mission.reference_at(start)
         until_ns = world.now_ns + round(seconds * 1e9)
         while world.now_ns < until_ns:
-            if steers:
-                self._aim(world, reference)
+            self._aim(world, reference)
             yield from _wait(world, _TARGET_S)
 
     def _prepare(self, world: World) -> Iterator[None]:

@@ -2,37 +2,32 @@
 
 from __future__ import annotations
 
-import socket
 from collections.abc import Mapping
 
 from bridge.pack import Encoder, Identity, Reader, enum, make_message
 from bridge.wire import FieldValue, Received
+from tools.sitl.wire import Wire
 
 GROUND = Identity(254, 190)
 """Not 255: nothing here needs the rights of a radio-control override, and this end must never hold a failsafe back."""
 
 HEARTBEAT_NS = 1_000_000_000
-_DATAGRAM_BYTES = 65535
 _VEHICLE, _AUTOPILOT = 1, 1
 
 
 class GroundStation:
-    """One end of a UDP wire. far: where the autopilot listens; None to answer whoever calls.
+    """One end of a wire.
 
     last: the autopilot's newest message of each name, with when it came [ns of simulated time].
     texts: its STATUSTEXTs with their times.
     """
 
-    def __init__(self, far: tuple[str, int] | None = None) -> None:
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setblocking(False)
-        self._socket.bind(("127.0.0.1", 0))
-        self._far = far
+    def __init__(self, wire: Wire) -> None:
+        self._wire = wire
         self._reader = Reader()
         self._encode = Encoder(GROUND)
         self._sequence = 0
         self._beat_ns = 0
-        self.port = int(self._socket.getsockname()[1])
         self.now_ns = 0
         self.last: dict[str, tuple[int, Mapping[str, FieldValue]]] = {}
         self.acks: dict[int, int] = {}
@@ -54,10 +49,9 @@ class GroundStation:
         return heard
 
     def say(self, name: str, **fields: FieldValue) -> None:
-        """Send one message; before the autopilot called, nobody is there."""
-        if self._far is not None:
-            self._socket.sendto(self._encode(make_message(name, self.now_ns, **fields), self._sequence), self._far)
-            self._sequence = (self._sequence + 1) % 256
+        """Send one message."""
+        self._wire.send(self._encode(make_message(name, self.now_ns, **fields), self._sequence))
+        self._sequence = (self._sequence + 1) % 256
 
     def command(self, number: int, *values: float) -> None:
         """Send a COMMAND_LONG; its result comes to `acks`."""
@@ -78,20 +72,11 @@ class GroundStation:
         return float(value) if isinstance(value, int | float) else None
 
     def close(self) -> None:
-        """Close the socket."""
-        self._socket.close()
+        """Close the wire."""
+        self._wire.close()
 
     def _hear(self) -> list[Received]:
-        messages: list[Received] = []
-        while True:
-            try:
-                data, peer = self._socket.recvfrom(_DATAGRAM_BYTES)
-            except BlockingIOError:
-                return messages
-            except ConnectionRefusedError:
-                continue
-            self._far = peer
-            messages += self._reader.feed(data)
+        return [message for piece in self._wire.receive() for message in self._reader.feed(piece)]
 
 
 def _whole(value: FieldValue) -> int:

@@ -24,14 +24,31 @@ _MAGIC = 18458
 _GRAVITY_inW = np.array([0.0, 0.0, -GRAVITY])
 _SILENCE_S = 15.0
 
+PHYSICS_PORT = 9002
+"""Where a simulator looks for its physics unless told otherwise."""
+
 
 class Lockstep:
-    """The physics' end of the wire, on loopback. R_WtoN: (3, 3), where north is in the room."""
+    """The physics' end of the wire, on loopback.
 
-    def __init__(self, R_WtoN: Array) -> None:
+    R_WtoN: (3, 3), where north is in the room.  port: 0 for any that is free.
+    """
+
+    def __init__(self, R_WtoN: Array, port: int = 0) -> None:
+        """Listen for the simulator.
+
+        Raises:
+            OperatorError: the port is taken.
+        """
         self._R_WtoN = R_WtoN
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.bind(("127.0.0.1", 0))
+        try:
+            self._socket.bind(("127.0.0.1", port))
+        except OSError as error:
+            self._socket.close()
+            raise OperatorError(
+                f"sitl: the physics' port {port} is taken ({error.strerror}); end the other program"
+            ) from error
         self._socket.settimeout(_SILENCE_S)
         self._peer: tuple[str, int] | None = None
         self._frame: int | None = None
@@ -49,7 +66,8 @@ class Lockstep:
                 data, self._peer = self._socket.recvfrom(256)
             except TimeoutError as error:
                 raise OperatorError(
-                    f"sitl: no servo packet within {_SILENCE_S:g} s; see what the simulator printed (sitl.out)"
+                    f"sitl: no servo packet within {_SILENCE_S:g} s; see what the simulator printed (sitl.out), "
+                    "or start it with --model JSON:127.0.0.1"
                 ) from error
             if len(data) != _PACKET.size:
                 continue

@@ -22,10 +22,13 @@ Radio = Callable[[], tuple[int, ...]]
 
 
 class ArduPilot:
-    """The real program, through its physics interface. start_ns: simulated time at which its own begins."""
+    """The real program, through its physics interface.
 
-    def __init__(self, room_yaw_deg: float, radio: Radio, start_ns: int) -> None:
-        self._lockstep = Lockstep(rotation_from_room(math.radians(room_yaw_deg)))
+    start_ns: simulated time at which its own begins.  port: where it looks for its physics, 0 for any that is free.
+    """
+
+    def __init__(self, room_yaw_deg: float, radio: Radio, start_ns: int, port: int = 0) -> None:
+        self._lockstep = Lockstep(rotation_from_room(math.radians(room_yaw_deg)), port)
         self._radio = radio
         self._start_ns = start_ns
         self.port = self._lockstep.port

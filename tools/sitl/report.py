@@ -59,12 +59,13 @@ class SitlReport:
     def faults_table(self) -> Table:
         """Lay the rehearsal out for a terminal."""
         table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
-        for head in ("fault", "excursion", "quiet hover", "autopilot's error", "worst ratio", "fail-safe"):
-            table.add_column(head, justify="left" if head == "fault" else "right")
+        for head in ("fault", "excursion", "by rights", "in quiet", "EKF error", "EKF ratio", "fail-safe"):
+            table.add_column(head, justify="left" if head == "fault" else "right", no_wrap=True)
         for each in self.outcomes:
             table.add_row(
                 f"{each.fault.name}: {each.fault.what}, {each.fault.lasts_s:g} s",
                 f"{each.excursion_mm:.0f} mm",
+                f"{each.fault.moves_mm:.0f} mm",
                 f"{each.quiet_mm:.0f} mm",
                 f"{each.ekf_error_mm:.0f} mm",
                 f"{each.worst_ratio:.2f}",

@@ -24,18 +24,14 @@ from bridge.settings.terms import terms_of
 from bridge.status import StatusLine
 from tools.request import Clocks
 from tools.session import recorder_of, tracker_of
-from tools.simulate.autopilot.parameters import FOR_VISION
 from tools.simulate.helicopter import Helicopter
 from tools.simulate.mission import Mission
-from tools.sitl.airframe import VEHICLE
+from tools.sitl.aboard import Aboard, Conditions, running, simulated, started
+from tools.sitl.aboard import close as close_aboard
 from tools.sitl.faults import Faults
 from tools.sitl.flight import Flight
-from tools.sitl.ground import GroundStation
-from tools.sitl.pilots import ArduPilot, Own
-from tools.sitl.process import Simulator, Wiring
 from tools.sitl.relay import Relay
 from tools.sitl.report import SitlReport, flags_of, judge
-from tools.sitl.setup import parameter_file
 from tools.sitl.world import FLOOR_Z_M, World
 from tools.steady import steady
 from tracker.errors import OperatorError
@@ -46,13 +42,17 @@ from tracker.types import Estimate, Event, Step
 LOG, REPORT = "sitl.mcap", "report.json"
 FRAMES = ("heli",)
 OWN, ARDUPILOT = "the project's simulated autopilot", "ArduPilot"
-_RATE_HZ, _LONGEST_S, _MISSION_S = 15.0, 600.0, 45.0
+_RATE_HZ, _LONGEST_S = 15.0, 600.0
 _CAMERA_DELAY_NS = 30_000_000
 
 
 @dataclass(frozen=True, slots=True)
 class SitlRequest:
-    """One flight. binary: ArduPilot's program, None for the project's simulated autopilot.  out: folder for its files.
+    """One flight.
+
+    binary: ArduPilot's program, None for the project's simulated autopilot.  out: folder for its files.
+    connect: tcp:HOST:PORT of SERIAL0 of one that runs already, None for none.
+    faults: whether to rehearse them.  mission_s: time for take-off, hover, square, turn and landing together.
 
     Raises:
         OperatorError: a frame that there is none of.
@@ -63,8 +63,12 @@ class SitlRequest:
     config: str
     out: Path
     faults: bool
+    mission_s: float = 45.0
+    connect: str | None = None
 
     def __post_init__(self) -> None:
+        if self.binary is not None and self.connect is not None:
+            raise OperatorError("--binary and --connect: start one or take one that runs; give one of them")
         if self.frame not in FRAMES:
             raise OperatorError(f"--frame {self.frame}: not known; known are {', '.join(FRAMES)}")
 
@@ -101,14 +105,14 @@ def fly(request: SitlRequest, clocks: Clocks, console: Console | None = None) ->
     settings = load_settings(request.config)
     _make_folder(request.out)
     with ExitStack() as stack:
-        relay, flight, world = _set_up(request, settings, stack)
-        faults = Faults(relay)
+        aboard, flight, world = _set_up(request, settings, stack)
+        faults = Faults(aboard.relay)
         world.told_aside_inW = lambda: faults.shift_inW
         world.start(flight.plan(world, faults.rehearse(world, flight) if request.faults else iter(())))
         watched = replace(clocks, wall=faults.wall_ns(clocks.wall))
-        witness, outlets = _run(request, settings, world, faults, relay, watched, console, stack)
+        witness, outlets = _run(request, settings, world, faults, aboard.relay, watched, console, stack)
     report = SitlReport(
-        OWN if request.binary is None else ARDUPILOT,
+        ARDUPILOT if request.binary or request.connect else OWN,
         judge(world.history, witness.estimates, flight.mission, world.done),
         outlets.summary(str(request.out / LOG)),
         {what: (at_ns - START_NS) / 1e9 for what, at_ns in flight.marks_ns.items()},
@@ -120,30 +124,22 @@ def fly(request: SitlRequest, clocks: Clocks, console: Console | None = None) ->
     return report
 
 
-def _set_up(request: SitlRequest, settings: Settings, stack: ExitStack) -> tuple[Relay, Flight, World]:
+def _set_up(request: SitlRequest, settings: Settings, stack: ExitStack) -> tuple[Aboard, Flight, World]:
     """Start the autopilot and wire it up."""
     room_yaw_deg = settings.room.room_yaw_deg
-    helicopter = Helicopter() if request.binary is None else VEHICLE
-    mission = Mission(_MISSION_S, FLOOR_Z_M + helicopter.skid_m)
+    mission = Mission(request.mission_s, FLOOR_Z_M + Helicopter.skid_m)
     flight = Flight(mission, math.radians(room_yaw_deg))
-    home = _home(settings)
-    delay_ms = round(_CAMERA_DELAY_NS / 1e6)
-    pilot: Own | ArduPilot
-    if request.binary is None:
-        pilot = Own({**FOR_VISION, "VISO_DELAY_MS": delay_ms}, START_NS)
-        ground = GroundStation(("127.0.0.1", pilot.ground_port))
-        relay = Relay(("127.0.0.1", pilot.bridge_port))
+    given = Conditions(room_yaw_deg, _home(settings), round(_CAMERA_DELAY_NS / 1e6), START_NS)
+    if request.connect is not None:
+        aboard = running(request.connect, request.out, given, flight.radio)
+    elif request.binary is not None:
+        aboard = started(request.binary, request.out, given, flight.radio, stack)
     else:
-        pilot = ArduPilot(room_yaw_deg, flight.radio, START_NS)
-        ground, relay = GroundStation(), Relay(None)
-    place = mission.ground_inW
-    world = World(pilot, ground, relay, helicopter, START_NS, (float(place[0]), float(place[1])), room_yaw_deg)
-    stack.callback(world.close)
-    if isinstance(pilot, ArduPilot) and request.binary is not None:
-        wiring = Wiring(pilot.port, ground.port, relay.far_port)
-        simulator = Simulator(request.binary, request.out, wiring, home, parameter_file(delay_ms, {}))
-        stack.callback(simulator.close)
-    return relay, flight, world
+        aboard = simulated(given)
+    stack.callback(close_aboard, aboard)
+    place = (float(mission.ground_inW[0]), float(mission.ground_inW[1]))
+    world = World(aboard.pilot, aboard.ground, aboard.relay, aboard.helicopter, START_NS, place, room_yaw_deg)
+    return aboard, flight, world
 
 
 def _home(settings: Settings) -> tuple[float, float, float]:
@@ -175,7 +171,7 @@ def _run(
         room_yaw_deg=settings.room.room_yaw_deg,
         stopwatch=clocks.stopwatch,
     )
-    about = {"source": "sitl", "autopilot": str(request.binary or OWN)}
+    about = {"source": "sitl", "autopilot": str(request.binary or request.connect or OWN)}
     recorder = recorder_of(request.out / LOG, settings, rig, about, clocks, overwrite=True, block_when_full=True)
     monitor = Monitor(tuple(camera.name for camera in rig.cameras))
     status = stack.enter_context(StatusLine(console, clocks.stopwatch))

@@ -105,12 +105,6 @@ class World:
             self._advance()
         return self._course.pose_at(t_ns)
 
-    def close(self) -> None:
-        """Let go of autopilot, ground station and wire."""
-        self._pilot.close()
-        self.ground.close()
-        self._relay.close()
-
     def _advance(self) -> None:
         now_ns, state = self._course.now_ns, self._course.back(0)
         if self._steps % TICK_STEPS == 0:
