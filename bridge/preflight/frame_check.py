@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from bridge.preflight.axes import PUSHES, Axes, axes_of, wrapped_deg
+from bridge.preflight.axes import EXPECTED, PUSHES, Axes, axes_of, wrapped_deg
 from bridge.preflight.verdict import Line, Mark
 from tracker.types import Array
 
@@ -49,6 +50,19 @@ def judge_frames(bridge: Witness, autopilot: Witness | None) -> tuple[Line, ...]
     if axes.upright and not axes.mirrored:
         lines += [_north_line(axes), _yaw_line(axes, bridge), _level_line(bridge, autopilot)]
     return (*lines, *_autopilot_lines(bridge, autopilot))
+
+
+def measured_rows(bridge: Witness, autopilot: Witness | None) -> Iterator[str]:
+    """Yield a table of what each push should have shown and what it did, north, east, down [m]."""
+    yield f"{'push, m':<10}{'expected N E D':>22}{'the bridge says':>24}{'the autopilot says':>24}"
+    for row, name in enumerate(PUSHES):
+        length = float(np.linalg.norm(bridge.pushes[row]))
+        theirs = "-" if autopilot is None else _vector(autopilot.pushes[row])
+        yield f"{name:<10}{_vector(length * EXPECTED[row]):>22}{_vector(bridge.pushes[row]):>24}{theirs:>24}"
+
+
+def _vector(v: Array) -> str:
+    return " ".join(f"{metres:+.2f}" for metres in v + 0.0)
 
 
 def _axes_line(axes: Axes) -> Line:
