@@ -10,7 +10,7 @@ from bridge.dialogue.peer import Autopilot, Peer
 from bridge.preflight import ardupilot
 from bridge.preflight.hearing import Hearing
 from bridge.preflight.parameters import Parameter
-from bridge.preflight.requests import VERSION
+from bridge.preflight.requests import POSITION, VERSION
 from bridge.preflight.verdict import Line, Mark
 
 OLDEST: Mapping[Autopilot, tuple[int, int, str]] = {
@@ -73,6 +73,9 @@ def origin_line(state: DialogueState, hearing: Hearing, configured: bool) -> Lin
         return Line(
             Mark.PASS, what, f"set; it is at {place.whole('lat') / 1e7:.5f}, {place.whole('lon') / 1e7:.5f}", needed
         )
+    if state.origin in (OriginState.SET, OriginState.LOST) and POSITION not in hearing.last:
+        fix = "it has no position yet, and proves its origin only with one: mend the other lines first"
+        return Line(Mark.UNKNOWN, what, "acknowledged, not proved", needed, fix)
     if state.origin == OriginState.SET:
         fix = "it acknowledged one, and does not know where it is: wait 15 s with poses; if that stays, reboot it"
         return Line(Mark.FAIL, what, "set, not proved", needed, fix)

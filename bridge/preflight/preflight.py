@@ -166,7 +166,9 @@ class Preflight:
             line = Line(Mark.UNKNOWN, "frame check", "not finished", "four moves", f"it waited for you to: {waiting}")
             return Section(FRAMES, (line,))
         bridge, autopilot = self.guide.witnesses()
-        return Section(FRAMES, judge_frames(bridge, autopilot), tuple(measured_rows(bridge, autopilot)))
+        return Section(
+            FRAMES, judge_frames(bridge, autopilot, self._given.room_yaw_deg), tuple(measured_rows(bridge, autopilot))
+        )
 
     def budget(self, window_ns: tuple[int, int]) -> Budget | None:
         """Return where the time goes, of poses stamped within a window of time [ns]."""

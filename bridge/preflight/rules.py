@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from bridge.preflight.parameters import Parameter
@@ -50,8 +50,11 @@ def names_of(rules: Iterable[Rule]) -> tuple[str, ...]:
     return tuple(name for rule in rules for name in rule.names)
 
 
-def judge(rules: Iterable[Rule], known: Mapping[str, Parameter]) -> tuple[Line, ...]:
+def judge(rules: Sequence[Rule], known: Mapping[str, Parameter]) -> tuple[Line, ...]:
     """Return a line for each rule; those without a parameter in this firmware only where one is needed."""
+    if rules and not known:
+        fix = "it answers no question: the link goes one way only, is too poor, or leads to another autopilot"
+        return (Line(Mark.UNKNOWN, "all of them", "none told", "told", fix),)
     lines = (_line(rule, known) for rule in rules)
     return tuple(line for line in lines if line is not None)
 

@@ -13,7 +13,7 @@ from rich.text import Text
 from bridge.preflight.verdict import Line, Mark, Section, good
 
 WIDTH = 120
-_MARK, _WHAT, _FOUND = 9, 23, 46
+_MARK, _WHAT, _FOUND = 9, 22, 42
 _STYLES = {Mark.PASS: "green", Mark.WARN: "yellow", Mark.FAIL: "bold red", Mark.UNKNOWN: "bold magenta"}
 _WORDS = {Mark.PASS: "pass", Mark.WARN: "warn", Mark.FAIL: "FAIL", Mark.UNKNOWN: "UNKNOWN"}
 
@@ -40,7 +40,8 @@ def verdict(sections: tuple[Section, ...]) -> Text:
         doubts = f", {count[Mark.WARN]} could be better" if count[Mark.WARN] else ""
         return Text(f"Nothing speaks against flying: {count[Mark.PASS]} lines passed{doubts}.", style="bold green")
     failed, unknown = count[Mark.FAIL], count[Mark.UNKNOWN]
-    return Text(f"DO NOT FLY: {failed} failed, {unknown} unknown. Mend them and check again.", style="bold red")
+    words = f"DO NOT FLY: {failed} failed, {unknown} unknown. Mend them from the top: the later follow from the first."
+    return Text(words, style="bold red")
 
 
 def to_json(sections: tuple[Section, ...], unchecked: tuple[str, ...]) -> str:

@@ -89,7 +89,7 @@ class Script:
             (link,) = self._outlet.link_states()
             why = f" ({link.reason})" if link.reason else ""
             raise OperatorError(
-                f"link {link.name}: no autopilot heard within {HEARD_S:g} s{why}; check its power, the cable or address, "
+                f"link {link.name}: no autopilot heard within {HEARD_S:g} s{why}; check power, cable or address, "
                 "the baud, and that its port speaks MAVLink (ArduPilot: SERIALn_PROTOCOL 2; PX4: MAV_n_CONFIG)"
             )
         self._voice.tell(f"{peer.autopilot} heard, system {peer.system_id}")

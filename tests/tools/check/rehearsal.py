@@ -1,4 +1,4 @@
-"""The check rehearsed: a simulated autopilot, a hand that holds it, true poses, in simulated time and without threads."""
+"""The check rehearsed: a simulated autopilot, a hand that holds it, true poses; in simulated time, no threads."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ import numpy as np
 
 from bridge.dialogue import Origin, Terms
 from bridge.links import MemoryLink, open_link
-from bridge.ned import rotation_from_room
 from bridge.outlet import Outlet, Spout
-from bridge.pack import Encoder, Identity, Packer
+from bridge.pack import Encoder, Identity, Packer, make_message
 from bridge.preflight.preflight import Given, Preflight
 from bridge.preflight.verdict import Line, Mark, Section, Write
 from tests.tools.check.hand import Hand
@@ -29,7 +28,8 @@ from tracker import so3
 from tracker.types import Array, Estimate, Event, Silence, Step, TrackState
 
 START_NS = 50_000_000_000
-STEP_NS, TICK_STEPS = 1_000_000, 10
+STEP_NS = 1_000_000
+ROUND, FINE_ROUND = 20, 5  # steps between two of the autopilot's rounds; its gyro's readings are means over one
 TRACK_NS = 5_000_000
 AS_DELAYED = {**FOR_VISION, "VISO_DELAY_MS": 35, "SERIAL1_BAUD": 921}
 """An autopilot as config/ardupilot-heli.parm has it, for a camera delay of 30 ms and 5 ms of tracking."""
@@ -62,7 +62,6 @@ class Rehearsal:
     def __init__(self, mistake: Mistake, room_yaw_deg: float = 30.0, rate_hz: float = 30.0) -> None:
         self._mistake = mistake
         self._rate_hz = rate_hz
-        self._R_WtoN = rotation_from_room(math.radians(room_yaw_deg))
         self.hand = Hand(math.radians(room_yaw_deg))  # nose to north
         p_BinW, R_BtoW = self.hand.pose_at(0.0)
         rest = State(p_BinW, R_BtoW, np.zeros(3), np.zeros(3), np.zeros(2), 0.0)
@@ -86,10 +85,12 @@ class Rehearsal:
         self.asked: tuple[Write, ...] = ()
         self.answer = True
         self._steps = 0
+        self._round = ROUND
 
     def check(self, **asked: bool) -> bool:
         """Check it all, and say whether it passed."""
         how = {"frame": False, "wiggle": False, "apply": False, "yes": False, **asked}
+        self._round = FINE_ROUND if how["wiggle"] else ROUND
         request = CheckRequest("lab", "sim:hand", None, 5.0, as_json=False, **how)
         script = Script(request, Preflight(self.given), self.outlet, self)
         try:
@@ -187,22 +188,16 @@ class Rehearsal:
                 self._talk()
 
     def _talk(self) -> None:
-        """Pass on what each has said; the autopilot does a round every 10 ms."""
+        """Pass on what each has said; the autopilot does its rounds and answers in between."""
         for _ in range(len(self._link.frames)):
             self._wire.send(self._link.frames.popleft())
-        if self._steps % TICK_STEPS == 0:
-            before, now = self._course.back(TICK_STEPS), self._course.back(0)
-            before, now = self._in_room(before), self._in_room(now)
-            self.autopilot.tick(self.now_ns(), self._imu.read(before, now, TICK_STEPS * STEP_NS / 1e9))
+        if self._steps % self._round == 0:
+            before, now = self._course.back(self._round), self._course.back(0)
+            self.autopilot.tick(self.now_ns(), self._imu.read(before, now, self._round * STEP_NS / 1e9))
         else:
             self.autopilot.hear(self.now_ns())
         for datagram in self._wire.receive():
             self._link.deliver(datagram)
         if self._mistake.second and self._steps % 1000 == 500:
-            beat = {"type": 2, "autopilot": 3, "base_mode": 0, "custom_mode": 0, "system_status": 3, "mavlink_version": 3}
-            from bridge.wire import Message
-
-            self._link.deliver(self._stranger(Message("HEARTBEAT", self.now_ns(), 0, beat), 0))
-
-    def _in_room(self, state: State) -> State:
-        return state
+            beat = make_message("HEARTBEAT", self.now_ns(), type=2, autopilot=3, mavlink_version=3)
+            self._link.deliver(self._stranger(beat, 0))
