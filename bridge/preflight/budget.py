@@ -115,8 +115,8 @@ def delay_lines(
 
 
 def _parameter_line(name: str, held_ms: float, wanted_ms: float, late_ms: float | None) -> Line:
-    how = "by stage times alone" if late_ms is None else "by stage times and the wiggle"
-    found, needed = f"{figure(held_ms)} ms", f"{wanted_ms:.0f} ms {how}, within {GOOD_MS:g} ms"
+    how = "by stage times" if late_ms is None else "by stages and wiggle"
+    found, needed = f"{figure(held_ms)} ms", f"{wanted_ms:.0f} +- {GOOD_MS:g} ms, {how}"
     if wanted_ms > MOST_DELAY_MS:
         fix = "the way is too long for any autopilot: see the stages, quicken the slowest"
         return Line(Mark.FAIL, name, found, f"below {MOST_DELAY_MS:g} ms; it is {wanted_ms:.0f} ms", fix)
@@ -135,7 +135,7 @@ def _wiggle_lines(wiggle: Delay | TooLittle, lag_s: float) -> Iterator[Line]:
         return
     late_ms, sigma_ms = 1e3 * (wiggle.late_s + lag_s), 1e3 * wiggle.sigma_s
     found = f"{abs(late_ms):.1f} +- {sigma_ms:.1f} ms {'late' if late_ms >= 0 else 'early'}"
-    found += f", motions agree by {100 * wiggle.correlation:.0f} %"
+    found += f", agreement {100 * wiggle.correlation:.0f} %"
     if abs(late_ms) <= GOOD_STAMPS_MS:
         yield Line(Mark.PASS, what, found, needed)
     else:

@@ -70,9 +70,8 @@ def origin_line(state: DialogueState, hearing: Hearing, configured: bool) -> Lin
         return Line(Mark.PASS, what, f"not needed by profile {state.profile}", "")
     place = hearing.last.get("GLOBAL_POSITION_INT")
     if state.origin == OriginState.SET and place is not None and place.whole("lat") and place.whole("lon"):
-        return Line(
-            Mark.PASS, what, f"set; it is at {place.whole('lat') / 1e7:.5f}, {place.whole('lon') / 1e7:.5f}", needed
-        )
+        where = ", ".join(f"{place.whole(axis) / 1e7:.5f}" for axis in ("lat", "lon"))
+        return Line(Mark.PASS, what, f"set, it is at {where}", needed)
     if state.origin in (OriginState.SET, OriginState.LOST) and POSITION not in hearing.last:
         fix = "it has no position yet, and proves its origin only with one: mend the other lines first"
         return Line(Mark.UNKNOWN, what, "acknowledged, not proved", needed, fix)
@@ -88,33 +87,41 @@ def origin_line(state: DialogueState, hearing: Hearing, configured: bool) -> Lin
     return Line(Mark.FAIL if configured else Mark.UNKNOWN, what, state.origin, needed, fix)
 
 
-def port_line(known: Mapping[str, Parameter], serial: bool) -> Line | None:
-    """Return the line on ArduPilot's serial ports that speak MAVLink, None where none were told.
+def port_line(known: Mapping[str, Parameter]) -> Line | None:
+    """Return the line on ArduPilot's serial ports that speak MAVLink, None where none were told."""
+    speaking = _speaking(known)
+    if not speaking:
+        return None
+    found = ", ".join(f"SERIAL{port} {baud}" for port, baud in speaking.items())
+    return Line(Mark.PASS, "MAVLink ports", found, "SERIALn_PROTOCOL 2, the wire's own baud")
 
-    serial: the link is one. ArduPilot takes the time that a message needs at SERIALn_BAUD off its stamp, though it
-    came by a faster way: right on a wire, early by as much behind Wi-Fi or in a simulator.
+
+def port_note(known: Mapping[str, Parameter]) -> str:
+    """Return what is to be known of slow ports where the link is no serial one, empty for nothing.
+
+    ArduPilot takes the time that a message needs at SERIALn_BAUD off its stamp, though it came by a faster way: right
+    on a wire, early by as much behind Wi-Fi or in a simulator.
     """
-    speaking = [
-        (port, _baud(known[f"SERIAL{port}_BAUD"].value))
+    slow = {port: baud for port, baud in _speaking(known).items() if port > 0 and baud < SLOW_BAUD}
+    if not slow:
+        return ""
+    port, baud = next(iter(slow.items()))
+    early_ms = 1e4 * PAIR_BYTES / baud
+    return (
+        f"If this link ends at SERIAL{port} by a way faster than {baud} baud (Wi-Fi, a simulator), its stamps are "
+        f"{early_ms:.0f} ms early: set SERIAL{port}_BAUD 921."
+    )
+
+
+def _speaking(known: Mapping[str, Parameter]) -> dict[int, int]:
+    """Return the baud of each port that speaks MAVLink."""
+    return {
+        port: _baud(known[f"SERIAL{port}_BAUD"].value)
         for port in ardupilot.PORTS
         if f"SERIAL{port}_BAUD" in known
         and f"SERIAL{port}_PROTOCOL" in known
         and known[f"SERIAL{port}_PROTOCOL"].value in MAVLINK_PORTS
-    ]
-    if not speaking:
-        return None
-    found = ", ".join(f"SERIAL{port} {baud} baud" for port, baud in speaking)
-    slow = [(port, baud) for port, baud in speaking if port > 0 and baud < SLOW_BAUD]
-    needed = "SERIALn_PROTOCOL 2 and the wire's own baud"
-    if serial or not slow:
-        return Line(Mark.PASS, "ports", found, needed)
-    port, baud = slow[0]
-    early_ms = 1e4 * PAIR_BYTES / baud
-    fix = (
-        f"if this link ends at SERIAL{port}, by Wi-Fi or in a simulator: set SERIAL{port}_BAUD 921 or more there, else "
-        f"its stamps are {early_ms:.0f} ms early; on a real wire of {baud} baud it is right as it is"
-    )
-    return Line(Mark.WARN, "ports", found, needed, fix)
+    }
 
 
 def _baud(value: float) -> int:

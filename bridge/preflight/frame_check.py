@@ -99,7 +99,7 @@ def _mirror_fix(axes: Axes, forward: Array, room_yaw_deg: float) -> str:
 
 
 def _north_line(axes: Axes) -> Line:
-    what, needed = "north", f"pushes lead where they should, within {MOST_NORTH_DEG:g} deg"
+    what, needed = "north", f"pushes lead there, within {MOST_NORTH_DEG:g} deg"
     turn = _rounded(axes.heading_deg)
     if abs(axes.heading_deg) <= MOST_NORTH_DEG:
         return Line(Mark.PASS, what, f"north within {abs(axes.heading_deg):.0f} deg", needed)
@@ -112,9 +112,9 @@ def _yaw_line(axes: Axes, bridge: Witness) -> Line:
     """Compare the yaw with the way the nose was pushed: what flew an autopilot away without a failsafe."""
     what, needed = "yaw against motion", f"within {GOOD_YAW_DEG:g} deg"
     error_deg = wrapped_deg(bridge.yaw_deg - axes.heading_deg)
-    found = f"yaw {wrapped_deg(bridge.yaw_deg):.0f} deg, pushed to {axes.heading_deg:.0f} deg"
+    found = f"yaw {wrapped_deg(bridge.yaw_deg):.0f} deg, pushed to {round(axes.heading_deg)} deg"
     if abs(error_deg) <= GOOD_YAW_DEG:
-        return Line(Mark.PASS, what, f"{error_deg:+.0f} deg apart", needed)
+        return Line(Mark.PASS, what, f"{round(error_deg):+d} deg apart", needed)
     turn = _rounded(error_deg)
     fix = (
         f"the marker's x axis points {abs(turn):.0f} deg to the {'right' if turn > 0 else 'left'} of the nose: turn "
@@ -129,9 +129,9 @@ def _level_line(bridge: Witness, autopilot: Witness | None) -> Line:
     what, needed = "level", f"within {MOST_TILT_DEG:g} deg"
     roll, pitch = (autopilot.roll_deg, autopilot.pitch_deg) if autopilot is not None else (0.0, 0.0)
     apart = max(abs(wrapped_deg(bridge.roll_deg - roll)), abs(wrapped_deg(bridge.pitch_deg - pitch)))
-    found = f"roll {bridge.roll_deg:+.0f}, pitch {bridge.pitch_deg:+.0f} deg"
+    found = f"roll {round(bridge.roll_deg):+d}, pitch {round(bridge.pitch_deg):+d} deg"
     if autopilot is not None:
-        found += f"; autopilot {roll:+.0f}, {pitch:+.0f} deg"
+        found += f"; its own {round(roll):+d}, {round(pitch):+d} deg"
     if apart <= MOST_TILT_DEG:
         return Line(Mark.PASS, what, found, needed)
     fix = (
@@ -155,7 +155,7 @@ def _autopilot_lines(bridge: Witness, autopilot: Witness | None) -> tuple[Line, 
     cosines = np.sum(bridge.pushes * autopilot.pushes, axis=1) / np.maximum(ours * theirs, 1e-9)
     twist_deg = float(np.degrees(np.arccos(np.clip(cosines.min(), -1.0, 1.0))))
     yaw_deg = wrapped_deg(autopilot.yaw_deg - bridge.yaw_deg)
-    found = f"{twist_deg:.0f} deg off the way, {100 * (ratio - 1):+.0f} % of its length, yaw {yaw_deg:+.0f} deg"
+    found = f"way {twist_deg:.0f} deg off, length {round(100 * (ratio - 1)):+d} %, yaw {round(yaw_deg):+d} deg"
     if twist_deg > MOST_TWIST_DEG or abs(yaw_deg) > MOST_YAW_DEG:
         fix = "it turns what it gets, or another source wins: set VISO_ORIENT 0, EK3_SRC1_YAW 6, COMPASS_ENABLE 0"
         return (Line(Mark.FAIL, what, found, needed, fix),)

@@ -29,7 +29,7 @@ _RATIOS = {
     Autopilot.ARDUPILOT: ("velocity_variance", "pos_horiz_variance", "pos_vert_variance", "compass_variance"),
     Autopilot.PX4: ("vel_ratio", "pos_horiz_ratio", "pos_vert_ratio", "mag_ratio"),
 }
-_RATIO_NAMES = ("velocity", "position", "height", "yaw")
+_RATIO_NAMES = ("v", "xy", "z", "yaw")
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,36 +94,36 @@ def _ours_at(times_ns: Sequence[int], poses: Sequence[Pose]) -> list[Array | Non
 
 
 def _difference_lines(hearing: Hearing, poses: Sequence[Pose], sync: SyncState | None, since_ns: int) -> Iterator[Line]:
-    needed = f"within {1e3 * MOST_LEVEL_M:.0f} mm level, {1e3 * MOST_HEIGHT_M:.0f} mm in height"
+    needed = f"ours, within {1e3 * MOST_LEVEL_M:.0f} mm level, {1e3 * MOST_HEIGHT_M:.0f} mm in height"
     if not poses:
         fix = "no poses to compare with: see the lines on poses"
-        yield Line(Mark.UNKNOWN, "position against ours", "no poses", needed, fix)
+        yield Line(Mark.UNKNOWN, "its position", "no poses", needed, fix)
         return
     if not hearing.since(POSITION, since_ns):
         fix = "its filter has no position: see the lines on parameters and origin, and what it says"
-        yield Line(Mark.FAIL, "position against ours", f"it sends no {POSITION}", needed, fix)
+        yield Line(Mark.FAIL, "its position", f"it sends no {POSITION}", needed, fix)
         return
     apart = difference(hearing, poses, sync, since_ns)
     if apart is None:
         fix = "poses or its messages came with too many gaps: see the lines on poses, then check again"
-        yield Line(Mark.UNKNOWN, "position against ours", "too few to compare", needed, fix)
+        yield Line(Mark.UNKNOWN, "its position", "too few to compare", needed, fix)
         return
-    moved = "at rest" if apart.moved_m < 0.05 else f"moved by {apart.moved_m:.1f} m"
+    moved = "at rest" if apart.moved_m < 0.05 else f"moved {apart.moved_m:.1f} m"
     found = f"{1e3 * apart.level_m:.0f} mm level, {1e3 * apart.height_m:.0f} mm in height, {moved}"
     if apart.level_m > MOST_LEVEL_M:
         fix = "it does not use the poses, or turns them: see the parameters above, then run --frame"
-        yield Line(Mark.FAIL, "position against ours", found, needed, fix)
+        yield Line(Mark.FAIL, "its position", found, needed, fix)
     elif apart.height_m > MOST_HEIGHT_M:
         fix = "ArduPilot: set EK3_SRC1_POSZ 6 and EK3_OGN_HGT_MASK 4, reboot; PX4: set EKF2_HGT_REF 3"
-        yield Line(Mark.FAIL, "position against ours", found, needed, fix)
+        yield Line(Mark.FAIL, "its position", found, needed, fix)
     else:
-        yield Line(Mark.PASS, "position against ours", found, needed)
-    yaw_needed = f"within {MOST_YAW_DEG:g} deg"
+        yield Line(Mark.PASS, "its position", found, needed)
+    yaw_needed = f"ours, within {MOST_YAW_DEG:g} deg"
     if abs(apart.yaw_deg) > MOST_YAW_DEG:
         fix = "another source sets its yaw: set EK3_SRC1_YAW 6, COMPASS_ENABLE 0; PX4: EKF2_EV_CTRL 15, EKF2_MAG_TYPE 5"
-        yield Line(Mark.FAIL, "yaw against ours", f"{apart.yaw_deg:+.1f} deg", yaw_needed, fix)
+        yield Line(Mark.FAIL, "its yaw", f"{apart.yaw_deg:+.1f} deg", yaw_needed, fix)
     else:
-        yield Line(Mark.PASS, "yaw against ours", f"{apart.yaw_deg:+.1f} deg", yaw_needed)
+        yield Line(Mark.PASS, "its yaw", f"{apart.yaw_deg:+.1f} deg", yaw_needed)
 
 
 def _filter_lines(hearing: Hearing, autopilot: Autopilot, since_ns: int) -> Iterator[Line]:

@@ -14,9 +14,8 @@ from bridge.dialogue import PROFILES, DialogueState
 from bridge.dialogue.peer import Autopilot, Peer
 from bridge.preflight import ardupilot, px4
 from bridge.preflight.budget import Budget, budget_of, delay_lines
-from bridge.preflight.clockwork import our_times
-from bridge.preflight.delay import Delay, TooLittle, find_delay
-from bridge.preflight.far_end import origin_line, port_line, who_lines
+from bridge.preflight.delay import Delay, TooLittle
+from bridge.preflight.far_end import origin_line, port_line, port_note, who_lines
 from bridge.preflight.frame_check import judge_frames, measured_rows
 from bridge.preflight.fusion import fusion_lines
 from bridge.preflight.guide import Guide
@@ -28,13 +27,13 @@ from bridge.preflight.rules import Rule, judge, names_of
 from bridge.preflight.said import said
 from bridge.preflight.streams import link_line, pose_lines, time_line, track_line
 from bridge.preflight.verdict import Line, Mark, Section
+from bridge.preflight.wiggle import gyro_lag_s, wiggled
 from bridge.wire import LinkState, Message, Received, Sent
-from tracker.types import Array, Step
+from tracker.types import Step
 
 WITH_VELOCITY = ("VISION_SPEED_ESTIMATE", "ODOMETRY")
 FRAMES = "Frames"
 _COMMAND_CHECKS, _ACCEPTED = 401, 0
-_MILLI = 1e-3
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +120,7 @@ class Preflight:
 
     def end_wiggle(self) -> None:
         """Find the delay in what came since the wiggle began."""
-        self.wiggle = self._found_delay()
+        self.wiggle = wiggled(self.hearing, self.watch.since(self._gyro_since_ns), self._far, self._gyro_since_ns)
         if self._requests is not None and self.peer is not None:
             self._requests.want(rates(self.peer.autopilot, gyro=False))
 
@@ -135,7 +134,7 @@ class Preflight:
             return ()
         return (
             Section("Autopilot", (*who_lines(self.hearing, peer, self._given.system_id), self._origin(far))),
-            Section("Parameters", tuple(self._parameter_lines(peer))),
+            Section("Parameters", tuple(self._parameter_lines(peer)), self._port_notes()),
             *(self._pose_sections(link, window_ns, far, peer) if self._given.poses else ()),
             self._said(window_ns[0]),
             *([self._frames()] if self.guide is not None else ()),
@@ -145,8 +144,9 @@ class Preflight:
         self, link: LinkState, window_ns: tuple[int, int], far: DialogueState, peer: Peer
     ) -> Iterator[Section]:
         profile, since_ns = PROFILES[far.profile], window_ns[0]
+        sent = (f"sent: {', '.join(self._given.messages or profile.messages)} (profile {profile.name})",)
         poses = pose_lines(self.watch, profile, far.holding, window_ns, self._given.max_age_ms)
-        yield Section("Poses", (track_line(self.watch), *poses, link_line(link), time_line(far.sync)))
+        yield Section("Poses", (track_line(self.watch), *poses, link_line(link), time_line(far.sync)), sent)
         ours = self.watch.since(since_ns)
         yield Section("Fusion", tuple(fusion_lines(self.hearing, ours, far.sync, peer.autopilot, since_ns)))
         budget = self.budget(window_ns)
@@ -203,9 +203,13 @@ class Preflight:
         if self.parameters is None:
             return
         yield from judge(self._rules(peer), self.parameters.known)
-        ports = port_line(self.parameters.known, self._given.serial)
+        ports = port_line(self.parameters.known)
         if ports is not None:
             yield ports
+
+    def _port_notes(self) -> tuple[str, ...]:
+        note = "" if self.parameters is None or self._given.serial else port_note(self.parameters.known)
+        return (note,) if note else ()
 
     def _origin(self, far: DialogueState) -> Line:
         return origin_line(far, self.hearing, self._given.origin)
@@ -215,27 +219,7 @@ class Preflight:
         return any(ack.whole("command") == _COMMAND_CHECKS and ack.whole("result") == _ACCEPTED for ack in acks)
 
     def _lag_s(self) -> float:
-        """Return by how much the gyro's report lags [s]: ArduPilot's is filtered, PX4's HIGHRES_IMU is not."""
-        known = {} if self.parameters is None else self.parameters.known
-        return ardupilot.gyro_lag_s(known[ardupilot.GYRO_FILTER].value) if ardupilot.GYRO_FILTER in known else 0.0
-
-    def _found_delay(self) -> Delay | TooLittle:
-        peer, far = self.peer, self._far
-        name = None if peer is None else GYRO.get(peer.autopilot)
-        if far is None or name is None:
-            return TooLittle("this autopilot's gyro message is not known")
-        if far.sync is None:
-            return TooLittle("its clock is not known: it answers no TIMESYNC within 10 ms; use a wire for this")
-        readings = self.hearing.since(name, self._gyro_since_ns)
-        if not readings:
-            return TooLittle(f"it sends no {name}")
-        poses = self.watch.since(self._gyro_since_ns)
-        return find_delay(
-            [pose.t_ns for pose in poses],
-            [pose.R_FtoN for pose in poses],
-            our_times(readings, far.sync),
-            [_rate(reading) for reading in readings],
-        )
+        return 0.0 if self.parameters is None else gyro_lag_s(self.parameters.known)
 
 
 def _more_names(autopilot: Autopilot) -> tuple[str, ...]:
@@ -243,9 +227,3 @@ def _more_names(autopilot: Autopilot) -> tuple[str, ...]:
     if autopilot is Autopilot.ARDUPILOT:
         return (ardupilot.DELAY, ardupilot.GYRO_FILTER, *ardupilot.port_names())
     return (px4.DELAY, *px4.port_names()) if autopilot is Autopilot.PX4 else ()
-
-
-def _rate(reading: Received) -> Array:
-    """Return the gyro's reading (3,) [rad/s]: HIGHRES_IMU is in rad/s, RAW_IMU of ArduPilot in thousandths of it."""
-    scale = 1.0 if reading.message == "HIGHRES_IMU" else _MILLI
-    return scale * np.array([reading.number(axis) for axis in ("xgyro", "ygyro", "zgyro")])

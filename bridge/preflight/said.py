@@ -10,7 +10,7 @@ from bridge.preflight.plain_words import Weight, explain
 from bridge.preflight.verdict import Line, Mark, Section
 
 TITLE = "What it says"
-ARMS = "nothing that keeps it from arming"
+ARMS = "nothing, in its present mode"
 _AGAINST = re.compile(r"^(PreArm|Arm|Preflight Fail)\b", re.IGNORECASE)
 
 

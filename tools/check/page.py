@@ -13,7 +13,7 @@ from rich.text import Text
 from bridge.preflight.verdict import Line, Mark, Section, good
 
 WIDTH = 120
-_MARK, _WHAT, _FOUND = 9, 22, 42
+_MARK, _WHAT, _FOUND = 9, 22, 44
 _STYLES = {Mark.PASS: "green", Mark.WARN: "yellow", Mark.FAIL: "bold red", Mark.UNKNOWN: "bold magenta"}
 _WORDS = {Mark.PASS: "pass", Mark.WARN: "warn", Mark.FAIL: "FAIL", Mark.UNKNOWN: "UNKNOWN"}
 
@@ -25,7 +25,7 @@ def to_text(sections: tuple[Section, ...], unchecked: tuple[str, ...]) -> Iterat
         for line in section.lines:
             yield from _rows(line)
         for note in section.notes:
-            yield Text(" " * _MARK + note, style="dim")
+            yield from (Text(" " * _MARK + row, style="dim") for row in _noted(note))
         yield Text()
     yield verdict(sections)
     if unchecked:
@@ -70,6 +70,11 @@ def _rows(line: Line) -> Iterator[Text]:
     if line.fix:
         for row in textwrap.wrap(f"-> {line.fix}", WIDTH - _MARK - 2, subsequent_indent="   "):
             yield Text(" " * (_MARK + 2) + row, style=_STYLES[line.mark])
+
+
+def _noted(note: str) -> list[str]:
+    """Return a note wrapped, the rows of a table as they are."""
+    return [note] if len(note) <= WIDTH - _MARK else textwrap.wrap(note, WIDTH - _MARK)
 
 
 def _row(mark: Mark, rest: str) -> Text:

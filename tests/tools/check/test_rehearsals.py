@@ -65,7 +65,7 @@ def test_a_wrong_parameter_is_named_with_its_fix(name: str, value: float, fix: s
 
 def test_a_source_that_is_not_vision_shows_as_a_filter_without_a_position_and_in_plain_words() -> None:
     failed = refused(Mistake(parameters={"EK3_SRC1_POSXY": 3, "EK3_SRC1_VELXY": 3})).lines(Mark.FAIL)
-    assert "sends no LOCAL_POSITION_NED" in failed["position against ours"].found
+    assert "sends no LOCAL_POSITION_NED" in failed["its position"].found
     assert "level position" in failed["filter"].found
     assert "told to use GPS" in failed['"PreArm: AHRS: EK3 sources require GPS"'].found
 
