@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter, deque
+from collections.abc import Mapping
 
+from bridge.alarms import Alarm
 from bridge.dialogue import DialogueState
 from bridge.histogram import Histogram
 from bridge.status import Reading
@@ -13,6 +15,7 @@ from tracker.types import Estimate, Event, Frame, Step, TrackState
 
 RATE_WINDOW_NS = 2_000_000_000
 SEND = "send"
+TOTAL = "frame to datagram"
 
 
 class Monitor:
@@ -81,8 +84,18 @@ class Monitor:
             self._stages[name] = Histogram()
         return self._stages[name]
 
-    def reading(self, links: tuple[LinkState, ...], log: str, far_ends: tuple[DialogueState, ...] = ()) -> Reading:
-        """Return what the status line shows now."""
+    def durations(self) -> Mapping[str, Histogram]:
+        """Return every stage by name, in order, and from frame to datagram under `TOTAL`."""
+        return {**self._stages, TOTAL: self._latency}
+
+    def reading(
+        self,
+        links: tuple[LinkState, ...],
+        log: str,
+        far_ends: tuple[DialogueState, ...] = (),
+        alarms: tuple[Alarm, ...] = (),
+    ) -> Reading:
+        """Return what the status line shows now; alarms: those that stand, what matters most first."""
         spread = self._latency.percentiles()
         newest = self._newest
         shown = newest if self.state is TrackState.TRACKING else None
@@ -98,6 +111,8 @@ class Monitor:
             far_ends=tuple(far.brief for far in far_ends if far.brief),
             log=log,
             clocks={name: offset for name, offset in self._clocks(shown).items() if offset.is_certain},
+            alarm=alarms[0].cause if alarms else "",
+            alarms=len(alarms),
         )
 
     def _clocks(self, estimate: Estimate | None) -> dict[str, ClockOffset]:

@@ -28,6 +28,7 @@ class Reading:
     clocks: offsets of the cameras' clocks, those that are certainly not zero, by camera name.
     links_up, links: how many links deliver, of how many.  far_ends: the autopilots there, in a word or two each.
     log: the log's state in a word or two.
+    alarm, alarms: the alarm that matters most, "" for none, and how many stand.
     """
 
     state: str
@@ -41,6 +42,8 @@ class Reading:
     log: str
     far_ends: tuple[str, ...] = ()
     clocks: Mapping[str, ClockOffset] = field(default_factory=lambda: MappingProxyType({}))
+    alarm: str = ""
+    alarms: int = 0
 
 
 class StatusLine:
@@ -95,12 +98,19 @@ def _line(reading: Reading) -> Text:
     clocks = "".join(f"clock {name} {offset} | " for name, offset in reading.clocks.items())
     far_ends = "".join(f" {far_end}" for far_end in reading.far_ends)
     return Text(
-        f"{reading.state:<9} {reading.rate_hz:5.1f} Hz | latency p50 {_figure(reading.latency_p50_ms)} "
-        f"p99 {_figure(reading.latency_p99_ms)} ms | x y z {position} m | NIS {_figure(reading.nis)} | "
+        f"{_alarm(reading)}{reading.state:<9} {reading.rate_hz:5.1f} Hz | latency p50 "
+        f"{_figure(reading.latency_p50_ms)} p99 {_figure(reading.latency_p99_ms)} ms | "
+        f"x y z {position} m | NIS {_figure(reading.nis)} | "
         f"{clocks}links {reading.links_up}/{reading.links}{far_ends} | log {reading.log}",
         overflow="ellipsis",
         no_wrap=True,
     )
+
+
+def _alarm(reading: Reading) -> str:
+    """Put the alarm first: on a narrow terminal the line's end is cut."""
+    more = f" (and {reading.alarms - 1} more)" if reading.alarms > 1 else ""
+    return f"{reading.alarm}{more} | " if reading.alarm else ""
 
 
 def _figure(value: float | None) -> str:

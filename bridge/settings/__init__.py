@@ -2,11 +2,12 @@
 
 from bridge.settings.choose_rig import ChosenRig, RigOrigin, marker_of, rig_of
 from bridge.settings.load import load_settings, shipped_configs
-from bridge.settings.models import LinkSettings, Settings, TrackerSettings
+from bridge.settings.models import LinkSettings, MonitorSettings, Settings, TrackerSettings
 
 __all__ = [
     "ChosenRig",
     "LinkSettings",
+    "MonitorSettings",
     "RigOrigin",
     "Settings",
     "TrackerSettings",

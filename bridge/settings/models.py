@@ -145,6 +145,14 @@ class MavlinkSettings(Section):
     max_age_ms: Positive = 100.0
 
 
+class MonitorSettings(Section):
+    """Where a running bridge can be watched, and what its alarms go by."""
+
+    port: Annotated[int, Strict(), Field(ge=0, le=65_528)] = 14_730
+    rate_min_hz: Positive = 15.0
+    latency_limit_ms: Positive = 60.0
+
+
 class OriginSettings(Section):
     """Where the room's origin lies on the globe."""
 
@@ -184,6 +192,7 @@ class Settings(Section):
     tracker: TrackerSettings = TrackerSettings()
     mavlink: MavlinkSettings = MavlinkSettings()
     origin: OriginSettings | None = None
+    monitor: MonitorSettings = MonitorSettings()
     links: tuple[LinkSettings, ...] = ()
 
     @model_validator(mode="after")

@@ -23,7 +23,7 @@ from bridge.settings import Settings, load_settings, rig_of
 from bridge.settings.terms import terms_of
 from bridge.status import StatusLine
 from tools.request import Clocks
-from tools.session import recorder_of, tracker_of
+from tools.session import recorder_of, telemetry_of, tracker_of
 from tools.simulate.helicopter import Helicopter
 from tools.simulate.mission import Mission
 from tools.sitl.aboard import Aboard, Conditions, running, simulated, started
@@ -175,7 +175,8 @@ def _run(
     recorder = recorder_of(request.out / LOG, settings, rig, about, clocks, overwrite=True, block_when_full=True)
     monitor = Monitor(tuple(camera.name for camera in rig.cameras))
     status = stack.enter_context(StatusLine(console, clocks.stopwatch))
-    outlets, clock = Outlets(outlet, monitor, recorder, status), StreamClock()
+    telemetry = telemetry_of("sitl", settings, rig, monitor, clocks)
+    outlets, clock = Outlets(outlet, monitor, recorder, status, telemetry), StreamClock()
     try:
         with steady():
             run(faults.events(_until_done(source, world)), witness, clock, outlets)
