@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 from bridge.clock import Nanoseconds
@@ -11,7 +11,7 @@ from bridge.dialogue import Dialogue, DialogueState, Ear, Terms
 from bridge.links import Link, open_link
 from bridge.pack import MESSAGES, Encoder, Identity, Packer
 from bridge.signing import Seal, Signing
-from bridge.wire import LinkState, Received, Sent
+from bridge.wire import LinkState, Message, Received, Sent
 from tracker.errors import OperatorError
 from tracker.types import Step
 
@@ -98,6 +98,12 @@ class Outlet:
                 for name in spout.dialogue.messages:
                     spout.link.send(packed[name])
         return self._sent()
+
+    def say(self, messages: Iterable[Message]) -> None:
+        """Send messages that are no poses, over every link."""
+        for message in messages:
+            for spout in self._spouts:
+                spout.link.send(message)
 
     def received(self) -> tuple[tuple[str, Received], ...]:
         """Return the messages that came in up to the last `send` and were not yet returned, with their link's URI."""

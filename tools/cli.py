@@ -21,6 +21,7 @@ from tracker.errors import OperatorError
 EXIT_PATH_NOT_HELD = 1
 EXIT_COLOURS_NOT_GOOD = 1
 EXIT_FLIGHT_NOT_GOOD = 1
+EXIT_CHECK_NOT_GOOD = 1
 EXIT_OPERATOR = 2
 EXIT_INTERRUPTED = 130
 STDOUT = Path("-")
@@ -348,3 +349,36 @@ def sitl(
 
     if not run_sitl(request, _clocks()).verdict.passed:
         raise typer.Exit(EXIT_FLIGHT_NOT_GOOD)
+
+
+@app.command()
+def check(
+    config: ConfigOption = "lab",
+    source: Annotated[
+        str, typer.Option(help="As for run; none: look at the autopilot alone, without poses.", metavar="URI")
+    ] = "camera:0,1",
+    link: Annotated[
+        str | None, typer.Option(help="The autopilot's link, as for run. Replaces the config's.", metavar="URI")
+    ] = None,
+    duration_s: Annotated[
+        float, typer.Option("--duration_s", "--duration-s", help="How long poses are watched [s].", metavar="S")
+    ] = 10.0,
+    frame: Annotated[bool, typer.Option("--frame", help="Lead through the frame check: four moves by hand.")] = False,
+    wiggle: Annotated[bool, typer.Option("--wiggle", help="Find the delay while you wiggle the vehicle.")] = False,
+    apply: Annotated[bool, typer.Option("--apply", help="Write the wrong parameters, after asking.")] = False,
+    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before writing.")] = False,
+    json: JsonOption = False,
+) -> None:
+    """Prove before take-off that the autopilot uses the poses: one page, a verdict a line, with its fix.
+
+    Exit code 0 when nothing speaks against flying; 1 when something failed or could not be seen.
+    """
+    from tools.check.request import CheckRequest
+
+    request = CheckRequest(config, source, link, duration_s, frame, wiggle, apply, yes, json)
+
+    _tell_of_compiling()
+    from tools.check.session import run_check
+
+    if not run_check(request, _clocks()):
+        raise typer.Exit(EXIT_CHECK_NOT_GOOD)

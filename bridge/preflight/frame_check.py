@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from bridge.preflight.axes import PUSHES, Axes, axes_of, wrapped_deg
+from bridge.preflight.axes import EXPECTED, PUSHES, Axes, axes_of, wrapped_deg
 from bridge.preflight.verdict import Line, Mark
 from tracker.types import Array
 
@@ -34,27 +35,42 @@ class Witness:
     yaw_deg: float
 
 
-def judge_frames(bridge: Witness, autopilot: Witness | None) -> tuple[Line, ...]:
+def judge_frames(bridge: Witness, autopilot: Witness | None, room_yaw_deg: float = 0.0) -> tuple[Line, ...]:
     """Return the frame check's lines.
 
     Args:
+        room_yaw_deg: heading of the room's x axis, by the config [deg].
         autopilot: None where it sent no LOCAL_POSITION_NED or ATTITUDE.
     """
     short = [name for name, push in zip(PUSHES, bridge.pushes, strict=True) if np.linalg.norm(push) < LEAST_PUSH_M]
     if short:
         found = f"{', '.join(short)}: too short to tell"
-        return (Line(Mark.FAIL, "frame: pushes", found, f"{LEAST_PUSH_M:g} m each", "repeat the frame check"),)
+        return (Line(Mark.FAIL, "pushes", found, f"{LEAST_PUSH_M:g} m each", "repeat the frame check"),)
     axes = axes_of(bridge.pushes)
-    lines = [_axes_line(axes)]
+    lines = [_axes_line(axes, bridge, room_yaw_deg)]
     if axes.upright and not axes.mirrored:
         lines += [_north_line(axes), _yaw_line(axes, bridge), _level_line(bridge, autopilot)]
     return (*lines, *_autopilot_lines(bridge, autopilot))
 
 
-def _axes_line(axes: Axes) -> Line:
-    what, needed = "frame: axes", "right-handed, z up"
+def measured_rows(bridge: Witness, autopilot: Witness | None) -> Iterator[str]:
+    """Yield a table of what each push should have shown and what it did, north, east, down [m]."""
+    yield f"{'push, m':<10}{'expected N E D':>22}{'the bridge says':>24}{'the autopilot says':>24}"
+    for row, name in enumerate(PUSHES):
+        length = float(np.linalg.norm(bridge.pushes[row]))
+        theirs = "-" if autopilot is None else _vector(autopilot.pushes[row])
+        yield f"{name:<10}{_vector(length * EXPECTED[row]):>22}{_vector(bridge.pushes[row]):>24}{theirs:>24}"
+
+
+def _vector(v: Array) -> str:
+    return " ".join(f"{metres:+.2f}" for metres in v + 0.0)
+
+
+def _axes_line(axes: Axes, bridge: Witness, room_yaw_deg: float) -> Line:
+    what, needed = "axes", "right-handed, z up"
     if axes.mirrored:
-        return Line(Mark.FAIL, what, f"mirrored: {axes.outcomes()}", needed, _mirror_fix(axes))
+        fix = _mirror_fix(axes, bridge.pushes[0], room_yaw_deg)
+        return Line(Mark.FAIL, what, f"mirrored: {axes.outcomes()}", needed, fix)
     if not axes.upright:
         fix = "the room's axes are not the calibration's: turn every camera's T_BS (T_CtoW) so that z points up"
         return Line(Mark.FAIL, what, axes.outcomes(), needed, fix)
@@ -66,17 +82,24 @@ def _axes_line(axes: Axes) -> Line:
     return Line(Mark.PASS, what, f"right-handed, z up, pushes within {axes.skew_deg:.0f} deg", needed)
 
 
-def _mirror_fix(axes: Axes) -> str:
-    """Name the likeliest of the mistakes that mirror a room."""
-    if not axes.upright and abs(axes.P[2, 2]) > 0.5:
+def _mirror_fix(axes: Axes, forward: Array, room_yaw_deg: float) -> str:
+    """Name the likeliest of the mistakes that mirror a room.
+
+    A level mirror sends a push to north to a heading of twice its own line's: that line is the room's x axis where y
+    has the wrong sign, its y axis where x has, and the diagonal where the two are swapped.
+    """
+    if not axes.upright:
         return "z is upside down: negate z in the calibration's room points and calibrate anew, then check again"
-    if abs(axes.P[0, 1]) > 0.5 and abs(axes.P[1, 0]) > 0.5:
-        return "x and y of the room are swapped: the y axis must lie 90 deg to the left of x seen from above"
-    return "one level axis of the room has the wrong sign, or two cameras are swapped: y must lie to the left of x"
+    line_deg = np.degrees(np.arctan2(forward[1], forward[0])) / 2.0 - room_yaw_deg
+    nearest = round(float(line_deg) / 45.0) % 4
+    if nearest in (1, 3):
+        return "x and y of the room are swapped: y must lie 90 deg to the left of x seen from above"
+    wrong = "y" if nearest == 0 else "x"
+    return f"{wrong} of the room has the wrong sign: y must lie 90 deg to the left of x seen from above; calibrate anew"
 
 
 def _north_line(axes: Axes) -> Line:
-    what, needed = "frame: north", f"pushes lead where they should, within {MOST_NORTH_DEG:g} deg"
+    what, needed = "north", f"pushes lead there, within {MOST_NORTH_DEG:g} deg"
     turn = _rounded(axes.heading_deg)
     if abs(axes.heading_deg) <= MOST_NORTH_DEG:
         return Line(Mark.PASS, what, f"north within {abs(axes.heading_deg):.0f} deg", needed)
@@ -87,11 +110,11 @@ def _north_line(axes: Axes) -> Line:
 
 def _yaw_line(axes: Axes, bridge: Witness) -> Line:
     """Compare the yaw with the way the nose was pushed: what flew an autopilot away without a failsafe."""
-    what, needed = "frame: yaw against motion", f"within {GOOD_YAW_DEG:g} deg"
+    what, needed = "yaw against motion", f"within {GOOD_YAW_DEG:g} deg"
     error_deg = wrapped_deg(bridge.yaw_deg - axes.heading_deg)
-    found = f"yaw {wrapped_deg(bridge.yaw_deg):.0f} deg, pushed to {axes.heading_deg:.0f} deg"
+    found = f"yaw {wrapped_deg(bridge.yaw_deg):.0f} deg, pushed to {round(axes.heading_deg)} deg"
     if abs(error_deg) <= GOOD_YAW_DEG:
-        return Line(Mark.PASS, what, f"{error_deg:+.0f} deg apart", needed)
+        return Line(Mark.PASS, what, f"{round(error_deg):+d} deg apart", needed)
     turn = _rounded(error_deg)
     fix = (
         f"the marker's x axis points {abs(turn):.0f} deg to the {'right' if turn > 0 else 'left'} of the nose: turn "
@@ -103,12 +126,12 @@ def _yaw_line(axes: Axes, bridge: Witness) -> Line:
 
 
 def _level_line(bridge: Witness, autopilot: Witness | None) -> Line:
-    what, needed = "frame: level", f"within {MOST_TILT_DEG:g} deg"
+    what, needed = "level", f"within {MOST_TILT_DEG:g} deg"
     roll, pitch = (autopilot.roll_deg, autopilot.pitch_deg) if autopilot is not None else (0.0, 0.0)
     apart = max(abs(wrapped_deg(bridge.roll_deg - roll)), abs(wrapped_deg(bridge.pitch_deg - pitch)))
-    found = f"roll {bridge.roll_deg:+.0f}, pitch {bridge.pitch_deg:+.0f} deg"
+    found = f"roll {round(bridge.roll_deg):+d}, pitch {round(bridge.pitch_deg):+d} deg"
     if autopilot is not None:
-        found += f"; autopilot {roll:+.0f}, {pitch:+.0f} deg"
+        found += f"; its own {round(roll):+d}, {round(pitch):+d} deg"
     if apart <= MOST_TILT_DEG:
         return Line(Mark.PASS, what, found, needed)
     fix = (
@@ -119,7 +142,7 @@ def _level_line(bridge: Witness, autopilot: Witness | None) -> Line:
 
 def _autopilot_lines(bridge: Witness, autopilot: Witness | None) -> tuple[Line, ...]:
     """Compare the autopilot's moves with the bridge's."""
-    what = "frame: autopilot follows"
+    what = "autopilot follows"
     needed = f"same way, length within {100 * MOST_SCALE:.0f} %"
     if autopilot is None:
         fix = "it sends no LOCAL_POSITION_NED or ATTITUDE: see the lines on origin and fusion"
@@ -132,7 +155,7 @@ def _autopilot_lines(bridge: Witness, autopilot: Witness | None) -> tuple[Line, 
     cosines = np.sum(bridge.pushes * autopilot.pushes, axis=1) / np.maximum(ours * theirs, 1e-9)
     twist_deg = float(np.degrees(np.arccos(np.clip(cosines.min(), -1.0, 1.0))))
     yaw_deg = wrapped_deg(autopilot.yaw_deg - bridge.yaw_deg)
-    found = f"{twist_deg:.0f} deg off the way, {100 * (ratio - 1):+.0f} % of its length, yaw {yaw_deg:+.0f} deg"
+    found = f"way {twist_deg:.0f} deg off, length {round(100 * (ratio - 1)):+d} %, yaw {round(yaw_deg):+d} deg"
     if twist_deg > MOST_TWIST_DEG or abs(yaw_deg) > MOST_YAW_DEG:
         fix = "it turns what it gets, or another source wins: set VISO_ORIENT 0, EK3_SRC1_YAW 6, COMPASS_ENABLE 0"
         return (Line(Mark.FAIL, what, found, needed, fix),)

@@ -107,7 +107,7 @@ class ParameterClient:
         self._talks[name] = _Talk(_Stage.SETTING, value)
 
     def due(self, now_ns: int) -> Message | None:
-        """Return the message to send now, None for nothing; links may drop more than one of a name at a time.
+        """Return the message to send now, None for nothing; each has a slot of its own, so that none replaces another.
 
         now_ns: monotonic time [ns].
         """
@@ -152,10 +152,10 @@ class ParameterClient:
         (self._absent if talk.stage is _Stage.READING else self._refused).append(name)
 
     def _ask(self, name: str, now_ns: int) -> Message:
-        return Message("PARAM_REQUEST_READ", now_ns, 0, {**self._target, "param_id": name, "param_index": -1})
+        return Message("PARAM_REQUEST_READ", now_ns, 0, {**self._target, "param_id": name, "param_index": -1}, name)
 
     def _set(self, name: str, value: float, now_ns: int) -> Message:
         kind = self._known[name].kind
         field = field_of(value, kind, self._bytewise)
         fields: dict[str, FieldValue] = {**self._target, "param_id": name, "param_value": field, "param_type": kind}
-        return Message("PARAM_SET", now_ns, 0, fields)
+        return Message("PARAM_SET", now_ns, 0, fields, name)

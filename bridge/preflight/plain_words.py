@@ -92,7 +92,7 @@ _TABLE: tuple[_Entry, ...] = (
         r"waiting for home",
         "it does not know where on Earth it is",
         "no EKF origin: without GPS someone must send one",
-        "set [mavlink] origin_latitude_deg and origin_longitude_deg, or set it on the ground station's map",
+        "add [origin] to the config, or set it on the ground station's map",
     ),
     _blocks(
         r"origin already set",

@@ -1,7 +1,8 @@
-"""A line of the verdict, and what --apply would write."""
+"""A line of the verdict, the sections of its page, and what --apply would write."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -10,8 +11,9 @@ class Mark(StrEnum):
     """How a line came out."""
 
     PASS = "pass"
-    WARN = "warn"
+    WARN = "warn"  # it flies, and could do better
     FAIL = "fail"
+    UNKNOWN = "unknown"  # it could not be seen, and nothing counts as good unseen
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,11 +41,20 @@ class Line:
     write: Write | None = None
 
 
-def good(lines: tuple[Line, ...]) -> bool:
-    """Say whether the vehicle may fly: no line failed."""
-    return all(line.mark is not Mark.FAIL for line in lines)
+@dataclass(frozen=True, slots=True)
+class Section:
+    """Lines that belong together, and notes beside them that judge nothing."""
+
+    title: str
+    lines: tuple[Line, ...]
+    notes: tuple[str, ...] = ()
 
 
-def writes(lines: tuple[Line, ...]) -> tuple[Write, ...]:
+def good(lines: Iterable[Line]) -> bool:
+    """Say whether the vehicle may fly: nothing failed, nothing stayed unseen."""
+    return all(line.mark in (Mark.PASS, Mark.WARN) for line in lines)
+
+
+def writes(lines: Iterable[Line]) -> tuple[Write, ...]:
     """Return what --apply would set, each parameter once."""
     return tuple({line.write.name: line.write for line in lines if line.write is not None}.values())

@@ -99,6 +99,12 @@ class Autopilot:
         """Say whether it is armed."""
         return self.mode in (Mode.FLYING, Mode.LANDING)
 
+    def hear(self, world_ns: int) -> None:
+        """Read what has come and answer what is asked, between two rounds as well. world_ns: drives its clock [ns]."""
+        self._now_ns = world_ns - self._booted_ns
+        for port in self.ports:
+            self._listen(port)
+
     def tick(self, world_ns: int, increment: Increment) -> PilotSticks:
         """Do one round: read what has come, navigate, decide, tell, and return the sticks.
 
@@ -106,10 +112,8 @@ class Autopilot:
             world_ns: drives its clock [ns].
             increment: what its IMU summed up since the last tick.
         """
-        self._now_ns = world_ns - self._booted_ns
+        self.hear(world_ns)
         self._increment = increment
-        for port in self.ports:
-            self._listen(port)
         self.navigation.advance(self._now_ns // 1_000_000, increment)
         self._state = self.navigation.state_now()
         if self._origin is not None and self.navigation.runs and self.navigation.origin is None:
@@ -151,6 +155,8 @@ class Autopilot:
             return requests.ACCEPTED
         if number == enum("MAV_CMD_DO_SET_MODE"):
             return self._set_mode(round(values[1]))
+        if number == enum("MAV_CMD_RUN_PREARM_CHECKS"):
+            return self._run_checks()
         if number == enum("MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN") and values[0] == 1 and not self.armed:
             self._booted_ns += self._now_ns
             for port in self.ports:
@@ -220,6 +226,13 @@ class Autopilot:
             return requests.FAILED
         self.mode = Mode.FLYING
         self._texts.append("Arming motors")
+        return requests.ACCEPTED
+
+    def _run_checks(self) -> int:
+        """Say at once what keeps it from arming; refused when armed."""
+        if self.armed:
+            return requests.FAILED
+        self._texts += [f"PreArm: {reason}" for reason in self.refusals()]
         return requests.ACCEPTED
 
     def _disarm(self) -> int:
