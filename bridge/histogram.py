@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 
@@ -37,6 +38,14 @@ class Histogram:
             return NO_SAMPLES
         p50, p95, p99 = (self._quantile_ms(share) for share in (0.50, 0.95, 0.99))
         return Percentiles(self._count, p50, p95, p99, self._max_ns / 1e6)
+
+    def coarse(self, edges_ns: tuple[int, ...]) -> tuple[int, ...]:
+        """Return how many samples lie below the first edge, between each two, and above the last; edges rising [ns]."""
+        self._fold()
+        total = np.append(0, np.cumsum(self._bins))
+        places = [math.ceil(BINS_PER_DECADE * math.log10(edge / LEAST_NS) - 0.5) for edge in edges_ns]
+        below = [int(total[min(max(place, 0), BINS)]) for place in places]
+        return tuple(b - a for a, b in pairwise((0, *below, self._count)))
 
     def _quantile_ms(self, share: float) -> float:
         """Return the duration that `share` of the samples do not exceed [ms]."""

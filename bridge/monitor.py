@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter, deque
+from collections.abc import Mapping
 
+from bridge.alarms import Alarm
 from bridge.histogram import Histogram
 from bridge.status import Reading
 from bridge.summary import LogSummary, Summary
@@ -12,6 +14,7 @@ from tracker.types import Estimate, Event, Frame, Step, TrackState
 
 RATE_WINDOW_NS = 2_000_000_000
 SEND = "send"
+TOTAL = "frame to datagram"
 
 
 class Monitor:
@@ -80,7 +83,11 @@ class Monitor:
             self._stages[name] = Histogram()
         return self._stages[name]
 
-    def reading(self, links: tuple[LinkState, ...], log: str) -> Reading:
+    def durations(self) -> Mapping[str, Histogram]:
+        """Return every stage by name, in order, and from frame to datagram under `TOTAL`."""
+        return {**self._stages, TOTAL: self._latency}
+
+    def reading(self, links: tuple[LinkState, ...], log: str, alarms: tuple[Alarm, ...] = ()) -> Reading:
         """Return what the status line shows now."""
         spread = self._latency.percentiles()
         newest = self._newest
@@ -95,6 +102,8 @@ class Monitor:
             links_up=sum(link.up for link in links),
             links=len(links),
             log=log,
+            alarm=alarms[0].cause if alarms else "",
+            alarms=len(alarms),
         )
 
     def summary(self, links: tuple[LinkState, ...], log: LogSummary | None) -> Summary:

@@ -118,6 +118,11 @@ class Recorder:
             waiting = self._pending + self._queue.qsize()
             self._error = f"log {self._path}: the disk did not take the last {waiting} steps; the log has no end"
 
+    @property
+    def path(self) -> Path:
+        """Return the log's path, as given."""
+        return self._path
+
     def __enter__(self) -> Self:
         return self
 

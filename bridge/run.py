@@ -17,6 +17,8 @@ from bridge.outlet import Outlet
 from bridge.recorder import Recorder
 from bridge.status import Reading, StatusLine
 from bridge.summary import LogSummary, Summary
+from bridge.telemetry.states import LogState, Surroundings
+from bridge.telemetry.telemetry import Telemetry
 from bridge.wire import Sent
 from tracker.types import Event, Rejected, Step
 
@@ -33,12 +35,13 @@ class Steps(Protocol):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Outlets:
-    """Where a run's results go: the autopilots, the figures, and if wanted the log and the screen."""
+    """Where a run's results go: the autopilots, the figures, and if wanted the log, the screen and who watches."""
 
     links: Outlet
     monitor: Monitor
     recorder: Recorder | None = None
     status: StatusLine | None = None
+    telemetry: Telemetry | None = None
 
     def log_state(self) -> str:
         """Say in a word or two how the log fares."""
@@ -48,6 +51,14 @@ class Outlets:
         if state.error is not None:
             return f"STOPPED: {state.error}"
         return f"{state.size_bytes / 1e6:.1f} MB" + (f", {state.dropped} steps dropped" if state.dropped else "")
+
+    def surroundings(self) -> Surroundings:
+        """Return how links and log stand."""
+        log = None
+        if self.recorder is not None:
+            state = self.recorder.state()
+            log = LogState(str(self.recorder.path), state.size_bytes, state.written, state.dropped, state.error or "")
+        return Surroundings(self.links.link_states(), log)
 
     def summary(self, log_path: str | None) -> Summary:
         """Return the run's figures; log_path names the log."""
@@ -78,6 +89,8 @@ def close(clock: Clock, outlets: Outlets) -> None:
     _enter(None, Step(outlets.monitor.state), last, clock.now_ns(), outlets)
     if outlets.recorder is not None:
         outlets.recorder.close()
+    if outlets.telemetry is not None:
+        outlets.telemetry.close(outlets.surroundings)
 
 
 def _deliver(event: Event | None, step: Step, clock: Clock, outlets: Outlets) -> None:
@@ -94,7 +107,10 @@ def _enter(event: Event | None, step: Step, sent: tuple[Sent, ...], now_ns: int,
     outlets.monitor.take(event, step, sent)
     if outlets.recorder is not None:
         outlets.recorder.take(event, step, sent, now_ns)
+    if outlets.telemetry is not None:
+        outlets.telemetry.take(event, step, sent, now_ns, outlets.surroundings)
 
 
 def _reading(outlets: Outlets) -> Reading:
-    return outlets.monitor.reading(outlets.links.link_states(), outlets.log_state())
+    alarms = () if outlets.telemetry is None else outlets.telemetry.alarms()
+    return outlets.monitor.reading(outlets.links.link_states(), outlets.log_state(), alarms)

@@ -25,6 +25,7 @@ class Reading:
     latency_p50_ms, latency_p99_ms: frame available to datagram handed over [ms].
     position_m: x, y, z of the body in the room [m].  nis: of the last update, over its degrees of freedom.
     links_up, links: how many links deliver, of how many.  log: the log's state in a word or two.
+    alarm, alarms: the alarm that matters most, "" for none, and how many stand.
     """
 
     state: str
@@ -36,6 +37,8 @@ class Reading:
     links_up: int
     links: int
     log: str
+    alarm: str = ""
+    alarms: int = 0
 
 
 class StatusLine:
@@ -88,12 +91,18 @@ class StatusLine:
 def _line(reading: Reading) -> Text:
     position = "-" if reading.position_m is None else " ".join(f"{metres:+.3f}" for metres in reading.position_m)
     return Text(
-        f"{reading.state:<9} {reading.rate_hz:5.1f} Hz | latency p50 {_figure(reading.latency_p50_ms)} "
+        f"{_alarm(reading)}{reading.state:<9} {reading.rate_hz:5.1f} Hz | latency p50 {_figure(reading.latency_p50_ms)} "
         f"p99 {_figure(reading.latency_p99_ms)} ms | x y z {position} m | NIS {_figure(reading.nis)} | "
         f"links {reading.links_up}/{reading.links} | log {reading.log}",
         overflow="ellipsis",
         no_wrap=True,
     )
+
+
+def _alarm(reading: Reading) -> str:
+    """Put the alarm first: on a narrow terminal the line's end is cut."""
+    more = f" (and {reading.alarms - 1} more)" if reading.alarms > 1 else ""
+    return f"{reading.alarm}{more} | " if reading.alarm else ""
 
 
 def _figure(value: float | None) -> str:

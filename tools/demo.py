@@ -25,7 +25,7 @@ from bridge.wire import Sent
 from tools.demo_plot import draw_flight
 from tools.request import Clocks, DemoRequest, Pace
 from tools.seen_picture import draw_seen
-from tools.session import recorder_of, tracker_of
+from tools.session import recorder_of, telemetry_of, tracker_of
 from tools.simulate.autopilot import Mode
 from tools.simulate.flight import Flight, flight_of
 from tools.simulate.helicopter import Helicopter
@@ -164,7 +164,8 @@ def _fly(
         recorder = recorder_of(log, settings, rig, about, clocks, overwrite=True, block_when_full=fast)
         monitor = _WatchedMonitor(tuple(camera.name for camera in rig.cameras), witness)
         status = stack.enter_context(StatusLine(console, clocks.stopwatch))
-        outlets = Outlets(outlet, monitor, recorder, status)
+        telemetry = telemetry_of("demo", settings, rig, monitor, clocks)
+        outlets = Outlets(outlet, monitor, recorder, status, telemetry)
         clock: Clock = StreamClock() if fast else HostClock(clocks.monotonic, START_NS)
         events = source if fast else Paced(source, clock, clocks.sleep_s, clocks.stopwatch)
         try:

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import importlib.metadata
 import json
+import os
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
 from rich.console import Console
 
+from bridge.alarms import Limits
 from bridge.clock import Clock, HostClock, StreamClock
 from bridge.monitor import Monitor
 from bridge.outlet import Outlet, open_outlet
@@ -20,6 +22,10 @@ from bridge.settings import Settings
 from bridge.settings.tuning import tuning_of
 from bridge.status import StatusLine
 from bridge.summary import Summary, to_text
+from bridge.telemetry.gauges import names_of
+from bridge.telemetry.post import open_post
+from bridge.telemetry.snapshot import About
+from bridge.telemetry.telemetry import Telemetry
 from tools.open_source import OpenedSource, open_source
 from tools.request import Clocks, Pace, RunRequest
 from tools.summary_file import check_summary_path, write_summary
@@ -52,7 +58,8 @@ def run_session(request: RunRequest, clocks: Clocks) -> None:
         recorder = _recorder(request, opened, clocks)
         monitor = Monitor(tuple(camera.name for camera in opened.chosen.rig.cameras))
         status = None if request.quiet else stack.enter_context(StatusLine(console, clocks.stopwatch))
-        outlets = Outlets(outlet, monitor, recorder, status)
+        telemetry = telemetry_of(request.source, request.settings, opened.chosen.rig, monitor, clocks)
+        outlets = Outlets(outlet, monitor, recorder, status, telemetry)
         events, clock = _paced(opened, request.pace, clocks)
         refused = False
         try:
@@ -119,6 +126,18 @@ def recorder_of(
         wall_clock=clocks.wall,
         **how,
     )
+
+
+def telemetry_of(source: str, settings: Settings, rig: Rig, monitor: Monitor, clocks: Clocks) -> Telemetry:
+    """Make the telemetry of a run; without a free port it still watches for alarms, and nobody can attach."""
+    post = open_post(settings.monitor.port) if settings.monitor.port else None
+    about = About(source, _version("posebridge"), os.getpid(), clocks.monotonic())
+    return Telemetry(about, names_of(rig), limits_of(settings), monitor, post, clocks.stopwatch)
+
+
+def limits_of(settings: Settings) -> Limits:
+    """Return what alarms go by."""
+    return Limits(settings.monitor.rate_min_hz, settings.monitor.latency_limit_ms)
 
 
 def _recorder(request: RunRequest, opened: OpenedSource, clocks: Clocks) -> Recorder | None:

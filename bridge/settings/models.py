@@ -144,6 +144,14 @@ class MavlinkSettings(Section):
     component_id: Annotated[int, Strict(), Field(ge=1, le=255)] = 197
 
 
+class MonitorSettings(Section):
+    """Where a running bridge can be watched, and what its alarms go by."""
+
+    port: Annotated[int, Strict(), Field(ge=0, le=65_528)] = 14_730
+    rate_min_hz: Positive = 15.0
+    latency_limit_ms: Positive = 60.0
+
+
 class LinkSettings(Section):
     """One way to an autopilot, and what goes over it at every estimate."""
 
@@ -164,6 +172,7 @@ class Settings(Section):
     marker: MarkerSettings
     tracker: TrackerSettings = TrackerSettings()
     mavlink: MavlinkSettings = MavlinkSettings()
+    monitor: MonitorSettings = MonitorSettings()
     links: tuple[LinkSettings, ...] = ()
 
     @model_validator(mode="after")

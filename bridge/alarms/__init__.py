@@ -1,0 +1,18 @@
+"""What is wrong with a run, in words: cause and remedy."""
+
+from bridge.alarms.readings import BallReading, CameraReading, Limits, Readings
+from bridge.alarms.rules import RULES, Level
+from bridge.alarms.watch import Alarm, Standing, advance, standing_alarms
+
+__all__ = [
+    "RULES",
+    "Alarm",
+    "BallReading",
+    "CameraReading",
+    "Level",
+    "Limits",
+    "Readings",
+    "Standing",
+    "advance",
+    "standing_alarms",
+]

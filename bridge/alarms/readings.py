@@ -1,0 +1,75 @@
+"""What alarms judge by: a run's figures at one instant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from bridge.telemetry.states import Surroundings
+from tracker.types import TrackState
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """What a run must keep to.
+
+    rate_min_hz: fewest poses a second that the autopilot, or the operator, asks for [Hz].
+    latency_limit_ms: longest time from frame to datagram for 99 of 100 poses [ms].
+    """
+
+    rate_min_hz: float = 15.0
+    latency_limit_ms: float = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class CameraReading:
+    """One camera.
+
+    silent_ms: since its last frame [ms].  blind_s: since a ball of its images was last used, while tracking [s].
+    clock_offset_ms, clock_sigma_ms: how much later than its stamps it was found to see, beyond what the config says,
+        and one sigma of that [ms]; None while not estimated.
+    configured_offset_ms: the config's clock_offset_ms.
+    """
+
+    name: str
+    silent_ms: float
+    blind_s: float = 0.0
+    clock_offset_ms: float | None = None
+    clock_sigma_ms: float | None = None
+    configured_offset_ms: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class BallReading:
+    """One ball. unseen_s: since any camera's sighting of it was last used, while tracking [s]."""
+
+    name: str
+    unseen_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class Readings:
+    """A run at one instant.
+
+    t_ns: stream time [ns].  running_s: since the first frame [s].
+    state, state_s: the track's, and for how long [s].
+    rate_hz: of the last two seconds [Hz].  gap_ms: longest of the last ten, the one going on included [ms].
+    age_ms: how old the oldest pose of the last two was when it left [ms].
+    latency_p99_ms: of the newest datagrams [ms].  nis_ratio: mean NIS over its degrees of freedom, of the last ten
+        seconds.  None for what is not known.
+    last_rejection: what was left out last and why, "" for nothing.
+    """
+
+    t_ns: int
+    running_s: float
+    state: TrackState
+    state_s: float
+    rate_hz: float
+    gap_ms: float | None
+    age_ms: float | None
+    latency_p99_ms: float | None
+    nis_ratio: float | None
+    cameras: tuple[CameraReading, ...]
+    balls: tuple[BallReading, ...]
+    around: Surroundings
+    limits: Limits
+    last_rejection: str = ""

@@ -1,0 +1,267 @@
+"""The rules: when each alarm is raised, when it is over, and what it says.
+
+Every limit has two edges and two times, so that a figure that dances on a limit raises no flurry of alarms.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from enum import Enum, StrEnum
+
+from bridge.alarms.readings import Readings
+from tracker.types import TrackState
+
+SETTLE_S = 3.0
+RATE_SLACK = 0.97  # frames at exactly the wanted rate jitter about it
+RATE_BACK = 0.985
+GAP_MS, GAP_SEVERE_MS = 100.0, 300.0
+AGE_MS = 250.0  # the longest delay that ArduPilot can be told of
+NIS_HIGH, NIS_LOW = 2.0, 0.4
+SILENT_MS = 500.0
+UNSEEN_S = 3.0
+BLIND_S = 5.0
+SOUGHT_S = 5.0
+OFFSET_MS, OFFSET_SIGMAS, OFFSET_KNOWN_MS = 3.0, 4.0, 1.5
+SYNC_S = 15.0
+
+
+class Level(StrEnum):
+    """How much it matters. ALARM: do not fly, or land.  WARNING: look into it."""
+
+    ALARM = "alarm"
+    WARNING = "warning"
+
+
+class Verdict(Enum):
+    """What a reading says of a rule. BETWEEN is neither bad enough to raise the alarm nor good enough to end it."""
+
+    BAD = "bad"
+    BETWEEN = "between"
+    GOOD = "good"
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """A verdict on one subject (a camera, a link, "" for the run), with its words for an alarm."""
+
+    subject: str
+    verdict: Verdict
+    cause: str
+    remedy: str
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """One alarm. raise_s, clear_s: how long a verdict must last to raise it, and to end it [s]."""
+
+    name: str
+    level: Level
+    raise_s: float
+    clear_s: float
+    judge: Callable[[Readings], Iterable[Finding]]
+
+
+def _above(value: float | None, bad: float, good: float) -> Verdict:
+    """Judge a value that should be small: bad above one limit, good again below another."""
+    if value is None or value <= good:
+        return Verdict.GOOD
+    return Verdict.BAD if value > bad else Verdict.BETWEEN
+
+
+def _below(value: float | None, bad: float, good: float) -> Verdict:
+    """Judge a value that should be large."""
+    return _above(None if value is None else -value, -bad, -good)
+
+
+def _when(bad: bool) -> Verdict:
+    return Verdict.BAD if bad else Verdict.GOOD
+
+
+def _track_lost(now: Readings) -> Iterator[Finding]:
+    why = f"; last left out: {now.last_rejection}" if now.last_rejection else ""
+    yield Finding(
+        "",
+        _when(now.state is TrackState.LOST),
+        f"track lost for {now.state_s:.1f} s: nothing is sent{why}",
+        "land or fly by hand; bring every ball into the view of two cameras",
+    )
+
+
+def _marker_not_found(now: Readings) -> Iterator[Finding]:
+    why = f"; last: {now.last_rejection}" if now.last_rejection else ""
+    yield Finding(
+        "",
+        _when(now.state is TrackState.SEARCHING and now.running_s > SOUGHT_S),
+        f"marker not found in {now.running_s:.0f} s{why}",
+        "run `posebridge colours`; check light, lens caps, calibration and that all balls are in two images",
+    )
+
+
+def _rate(now: Readings) -> Iterator[Finding]:
+    need_hz = now.limits.rate_min_hz
+    steady = now.state is TrackState.TRACKING and now.state_s > SETTLE_S
+    verdict = _below(now.rate_hz, RATE_SLACK * need_hz, RATE_BACK * need_hz) if steady else Verdict.GOOD
+    yield Finding(
+        "",
+        verdict,
+        f"rate {now.rate_hz:.1f} Hz, needed {need_hz:g} Hz",
+        "shorten the exposure, check the cameras' frame rate and what else this computer does",
+    )
+
+
+def _gap_severe(now: Readings) -> Iterator[Finding]:
+    yield Finding(
+        "",
+        _above(now.gap_ms, GAP_SEVERE_MS, GAP_SEVERE_MS),
+        f"a gap of {now.gap_ms or 0:.0f} ms between poses; ArduPilot gives vision up after {GAP_SEVERE_MS:.0f} ms",
+        "find what covers the balls, stops a camera or holds this computer up",
+    )
+
+
+def _gap(now: Readings) -> Iterator[Finding]:
+    yield Finding(
+        "",
+        _above(now.gap_ms, GAP_MS, GAP_MS),
+        f"a gap of {now.gap_ms or 0:.0f} ms between poses, limit {GAP_MS:.0f} ms",
+        "look at what was left out and at the frames of each camera",
+    )
+
+
+def _latency(now: Readings) -> Iterator[Finding]:
+    limit_ms = now.limits.latency_limit_ms
+    yield Finding(
+        "",
+        _above(now.latency_p99_ms, limit_ms, 0.9 * limit_ms),
+        f"latency p99 {now.latency_p99_ms or 0:.0f} ms, limit {limit_ms:g} ms",
+        "stop other programs on this computer, or track fewer or smaller images",
+    )
+
+
+def _age(now: Readings) -> Iterator[Finding]:
+    yield Finding(
+        "",
+        _above(now.age_ms, AGE_MS, 0.8 * AGE_MS),
+        f"poses leave {now.age_ms or 0:.0f} ms after their frames' stamps, limit {AGE_MS:.0f} ms",
+        "this computer falls behind its cameras: lower their frame rate or use a faster one",
+    )
+
+
+def _nis_high(now: Readings) -> Iterator[Finding]:
+    yield Finding(
+        "",
+        _above(now.nis_ratio, NIS_HIGH, 0.9 * NIS_HIGH),
+        f"NIS {now.nis_ratio or 0:.2f} times its expectation, limit {NIS_HIGH:g}: the images disagree with the model",
+        "calibrate the cameras anew, check the balls' positions in the config and the cameras' clocks",
+    )
+
+
+def _nis_low(now: Readings) -> Iterator[Finding]:
+    yield Finding(
+        "",
+        _below(now.nis_ratio, NIS_LOW, 1.1 * NIS_LOW),
+        f"NIS {now.nis_ratio or 0:.2f} times its expectation, limit {NIS_LOW:g}: the filter is too cautious",
+        "lessen pixel_noise_px or [tracker.process] in the config",
+    )
+
+
+def _camera_silent(now: Readings) -> Iterator[Finding]:
+    for camera in now.cameras:
+        yield Finding(
+            camera.name,
+            _above(camera.silent_ms, SILENT_MS, SILENT_MS / 2),
+            f"{camera.name} has given no frame for {camera.silent_ms / 1e3:.1f} s",
+            "check its cable, power and USB bus; it is taken back by itself",
+        )
+
+
+def _camera_blind(now: Readings) -> Iterator[Finding]:
+    for camera in now.cameras:
+        yield Finding(
+            camera.name,
+            _above(camera.blind_s, BLIND_S, 1.0),
+            f"{camera.name} gives frames, but no ball in them was used for {camera.blind_s:.0f} s",
+            "look through it (`posebridge colours --picture`): lens, light, focus, or it was moved",
+        )
+
+
+def _ball_unseen(now: Readings) -> Iterator[Finding]:
+    for ball in now.balls:
+        yield Finding(
+            ball.name,
+            _above(ball.unseen_s, UNSEEN_S, 1.0),
+            f"no camera has seen the {ball.name} ball for {ball.unseen_s:.0f} s",
+            "check its paint and light, and learn the colours anew (`posebridge colours`)",
+        )
+
+
+def _clock_offset(now: Readings) -> Iterator[Finding]:
+    for camera in now.cameras:
+        found_ms, sigma_ms = camera.clock_offset_ms or 0.0, camera.clock_sigma_ms
+        known = sigma_ms is not None and sigma_ms < OFFSET_KNOWN_MS and abs(found_ms) > OFFSET_SIGMAS * sigma_ms
+        yield Finding(
+            camera.name,
+            _above(abs(found_ms), OFFSET_MS, 0.7 * OFFSET_MS) if known else Verdict.GOOD,
+            f"{camera.name} sees {found_ms:+.1f} ms later than its stamps say (sigma {sigma_ms or 0:.1f} ms)",
+            f"set clock_offset_ms = {camera.configured_offset_ms + found_ms:.1f} for {camera.name} in the config",
+        )
+
+
+def _link_down(now: Readings) -> Iterator[Finding]:
+    for link in now.around.links:
+        yield Finding(
+            link.name,
+            _when(not link.up),
+            f"link {link.name} is down: {link.reason}",
+            "check that the autopilot has power, the cable, port and baud; it is tried again by itself",
+        )
+
+
+def _log_stopped(now: Readings) -> Iterator[Finding]:
+    log = now.around.log
+    if log is not None:
+        yield Finding("", _when(bool(log.error)), log.error, "free space on the disk and start anew; the flight goes on")
+
+
+def _log_dropping(now: Readings) -> Iterator[Finding]:
+    log = now.around.log
+    if log is not None and not log.error:
+        yield Finding(
+            "",
+            _when(log.dropped > 0),
+            f"the log lacks {log.dropped} steps: the disk is slower than the flight",
+            "log to a faster disk",
+        )
+
+
+def _time_sync(now: Readings) -> Iterator[Finding]:
+    for sync in now.around.time_syncs:
+        yield Finding(
+            sync.link,
+            _when(not sync.converged and now.running_s > SYNC_S),
+            f"time sync on {sync.link} has not settled ({sync.samples} samples): PX4 then uses arrival times",
+            "check that the link is two-way and its round trip under 10 ms",
+        )
+
+
+GAP_RULE = Rule("gap", Level.WARNING, 0.0, 0.0, _gap)
+GAP_SEVERE_RULE = Rule("gap_severe", Level.ALARM, 0.0, 0.0, _gap_severe)
+RULES = (
+    Rule("track_lost", Level.ALARM, 0.3, 1.0, _track_lost),
+    Rule("marker_not_found", Level.ALARM, 0.0, 0.0, _marker_not_found),
+    Rule("rate", Level.ALARM, 1.0, 2.0, _rate),
+    GAP_SEVERE_RULE,
+    GAP_RULE,
+    Rule("latency", Level.WARNING, 1.0, 2.0, _latency),
+    Rule("age", Level.ALARM, 1.0, 2.0, _age),
+    Rule("nis_high", Level.WARNING, 5.0, 2.0, _nis_high),
+    Rule("nis_low", Level.WARNING, 5.0, 2.0, _nis_low),
+    Rule("camera_silent", Level.ALARM, 0.0, 1.0, _camera_silent),
+    Rule("camera_blind", Level.WARNING, 0.0, 1.0, _camera_blind),
+    Rule("ball_unseen", Level.WARNING, 0.0, 1.0, _ball_unseen),
+    Rule("clock_offset", Level.WARNING, 2.0, 2.0, _clock_offset),
+    Rule("link_down", Level.ALARM, 0.5, 1.0, _link_down),
+    Rule("log_stopped", Level.WARNING, 0.0, 0.0, _log_stopped),
+    Rule("log_dropping", Level.WARNING, 0.0, 0.0, _log_dropping),
+    Rule("time_sync", Level.WARNING, 0.0, 1.0, _time_sync),
+)
