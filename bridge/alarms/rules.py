@@ -220,7 +220,9 @@ def _link_down(now: Readings) -> Iterator[Finding]:
 def _log_stopped(now: Readings) -> Iterator[Finding]:
     log = now.around.log
     if log is not None:
-        yield Finding("", _when(bool(log.error)), log.error, "free space on the disk and start anew; the flight goes on")
+        yield Finding(
+            "", _when(bool(log.error)), log.error, "free space on the disk and start anew; the flight goes on"
+        )
 
 
 def _log_dropping(now: Readings) -> Iterator[Finding]:

@@ -50,9 +50,7 @@ class Telemetry:
         """Return the port that it answers on."""
         return None if self._post is None else self._post.port
 
-    def take(
-        self, event: Event | None, step: Step, sent: tuple[Sent, ...], now_ns: int, around: Around
-    ) -> None:
+    def take(self, event: Event | None, step: Step, sent: tuple[Sent, ...], now_ns: int, around: Around) -> None:
         """Enter one turn at stream time now_ns [ns]; around: tells how links and log stand, called only when needed."""
         self._gauges.take(event, step, sent, now_ns)
         self._watch(around)
