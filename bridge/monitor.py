@@ -6,9 +6,10 @@ from collections import Counter, deque
 from collections.abc import Mapping
 
 from bridge.alarms import Alarm
+from bridge.dialogue import DialogueState
 from bridge.histogram import Histogram
 from bridge.status import Reading
-from bridge.summary import LogSummary, Summary
+from bridge.summary import ClockOffset, LogSummary, Summary
 from bridge.wire import LinkState, Sent
 from tracker.types import Estimate, Event, Frame, Step, TrackState
 
@@ -87,7 +88,13 @@ class Monitor:
         """Return every stage by name, in order, and from frame to datagram under `TOTAL`."""
         return {**self._stages, TOTAL: self._latency}
 
-    def reading(self, links: tuple[LinkState, ...], log: str, alarms: tuple[Alarm, ...] = ()) -> Reading:
+    def reading(
+        self,
+        links: tuple[LinkState, ...],
+        log: str,
+        far_ends: tuple[DialogueState, ...] = (),
+        alarms: tuple[Alarm, ...] = (),
+    ) -> Reading:
         """Return what the status line shows now."""
         spread = self._latency.percentiles()
         newest = self._newest
@@ -101,12 +108,23 @@ class Monitor:
             nis=None if shown is None or not shown.nis_dof else shown.nis / shown.nis_dof,
             links_up=sum(link.up for link in links),
             links=len(links),
+            far_ends=tuple(far.brief for far in far_ends if far.brief),
             log=log,
             alarm=alarms[0].cause if alarms else "",
             alarms=len(alarms),
+            clocks={name: offset for name, offset in self._clocks(shown).items() if offset.is_certain},
         )
 
-    def summary(self, links: tuple[LinkState, ...], log: LogSummary | None) -> Summary:
+    def _clocks(self, estimate: Estimate | None) -> dict[str, ClockOffset]:
+        """Return the clocks of the cameras but the first as an estimate has them."""
+        if estimate is None:
+            return {}
+        offsets = zip(self._names, estimate.clock_offsets_s, estimate.clock_sigmas_s, strict=False)
+        return {name: ClockOffset(1e3 * float(offset), 1e3 * float(sigma)) for name, offset, sigma in [*offsets][1:]}
+
+    def summary(
+        self, links: tuple[LinkState, ...], log: LogSummary | None, far_ends: tuple[DialogueState, ...] = ()
+    ) -> Summary:
         """Return the figures of the run so far."""
         lasted_ns = 0 if self._newest is None or self._first_ns is None else self._newest.t_ns - self._first_ns
         return Summary(
@@ -119,7 +137,9 @@ class Monitor:
             rejected=dict(sorted(self._rejected.items())),
             lost=self._lost,
             resets=self._resets,
+            clocks=self._clocks(self._newest),
             links=links,
+            far_ends=far_ends,
             log=log,
         )
 

@@ -10,19 +10,25 @@ import struct
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tracker import so3
 from tracker.compiled import compiled
 from tracker.errors import OperatorError
 from tracker.types import Array, Estimate, frozen_array
 
-# F is B turned by half a turn about x; as a diagonal it is its own inverse and flips columns by broadcasting.
-_FLIP = frozen_array([1.0, -1.0, -1.0])
+Floats = NDArray[np.float32]
+
+# F is B turned by half a turn about x: a diagonal, and its own inverse.
+_FLIP = (1.0, -1.0, -1.0)
 # Euler angles end at pitch +/-90 deg. Beyond 89.4 deg their covariance stays at its value there: already "unknown"
 # to any filter, and still positive definite in 32-bit floats, which resolve 1 - rho^2 = cos(pitch)^2 no further.
 _MIN_COS_PITCH = 0.01
-_POSE_FLOAT32 = struct.Struct("<31f")
-_VELOCITY_FLOAT32 = struct.Struct("<12f")
+_TWIST_FLOAT32 = struct.Struct("<27f")
+_UPPER = np.triu_indices(6)
+_POLE = 1.0 - 1e-12  # as `so3.to_euler`
+_READ_ONLY = "Array(f8, 2, 'A', readonly=True)"
+_READ_ONLY_1D = "Array(f8, 1, 'A', readonly=True)"
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -47,6 +53,19 @@ class NedVelocity:
     covariance: list[float]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class NedTwist:
+    """An estimate's motion in the body's own axes; every float is exact in 32 bits.
+
+    v_BinF: [m/s].  w_BinF: [rad/s].
+    covariance: row-major upper triangle, 21 long, of the (6, 6) covariance of both.
+    """
+
+    v_BinF: list[float]
+    w_BinF: list[float]
+    covariance: list[float]
+
+
 class NedFrame:
     """Where north is in the room.
 
@@ -59,32 +78,33 @@ class NedFrame:
         self.R_WtoN = rotation_from_room(math.radians(room_yaw_deg))
 
     def pose(self, estimate: Estimate) -> NedPose:
-        """Turn an estimate's pose and the pose part of its covariance.
-
-        Source: R_FtoN = R_WtoN R_BtoW diag(1, -1, -1); covariance by `pose_jacobian`.
-        """
-        R_FtoN = self.R_WtoN @ estimate.R_BtoW * _FLIP
-        roll, pitch, yaw = so3.to_euler(R_FtoN)
-        J = pose_jacobian(self.R_WtoN, roll, pitch)
-        triangle = turned_triangle(J, estimate.covariance)
-        rounded = _POSE_FLOAT32.unpack(
-            _POSE_FLOAT32.pack(
-                *(self.R_WtoN @ estimate.p_BinW).tolist(),
-                roll,
-                pitch,
-                yaw,
-                *so3.quaternion(R_FtoN).tolist(),
-                *triangle.tolist(),
-            )
-        )
-        return NedPose(list(rounded[:3]), list(rounded[3:6]), list(rounded[6:10]), list(rounded[10:]))
+        """Turn an estimate's pose and the pose part of its covariance."""
+        values = _turned_pose(self.R_WtoN, estimate.p_BinW, estimate.R_BtoW, estimate.covariance).tolist()
+        return NedPose(values[:3], values[3:6], values[6:10], values[10:])
 
     def velocity(self, estimate: Estimate) -> NedVelocity:
         """Turn an estimate's velocity and its covariance."""
-        covariance = self.R_WtoN @ estimate.covariance[6:9, 6:9] @ self.R_WtoN.T
-        values = (self.R_WtoN @ estimate.v_BinW).tolist() + covariance.ravel().tolist()
-        rounded = _VELOCITY_FLOAT32.unpack(_VELOCITY_FLOAT32.pack(*values))
-        return NedVelocity(list(rounded[:3]), list(rounded[3:]))
+        values = _turned_velocity(self.R_WtoN, estimate.v_BinW, estimate.covariance).tolist()
+        return NedVelocity(values[:3], values[3:])
+
+    def twist(self, estimate: Estimate) -> NedTwist:
+        """Turn an estimate's velocity and rate into F, with their covariance.
+
+        Derivation: v_B = R_BtoW' v. With R_BtoW = R_hat exp(theta) it changes by [v_B]x theta for an attitude error and
+        by R_hat' dv for a velocity error; the rate is the body's already. F is B with y and z turned about.
+        """
+        R_WtoB = estimate.R_BtoW.T
+        v_B = R_WtoB @ estimate.v_BinW
+        J = np.zeros((6, 12))
+        J[:3, 3:6] = so3.hat(v_B)
+        J[:3, 6:9] = R_WtoB
+        J[3:, 9:] = np.eye(3)
+        J *= np.tile(_FLIP, 2)[:, None]
+        covariance = J @ estimate.covariance @ J.T
+        flip = np.array(_FLIP)
+        values = (flip * v_B).tolist() + (flip * estimate.w_BinB).tolist() + covariance[_UPPER].tolist()
+        rounded = _TWIST_FLOAT32.unpack(_TWIST_FLOAT32.pack(*values))
+        return NedTwist(list(rounded[:3]), list(rounded[3:6]), list(rounded[6:]))
 
 
 def rotation_from_room(room_yaw: float) -> Array:
@@ -96,7 +116,28 @@ def rotation_from_room(room_yaw: float) -> Array:
     return frozen_array([[c, s, 0.0], [s, -c, 0.0], [0.0, 0.0, -1.0]])
 
 
-@compiled("f8[::1](Array(f8, 2, 'A', readonly=True), Array(f8, 2, 'A', readonly=True))")
+@compiled(f"f8[:, ::1]({_READ_ONLY}, f8, f8)")
+def pose_jacobian(R_WtoN: Array, roll: float, pitch: float) -> Array:
+    """Return J (6, 6): (dx dy dz droll dpitch dyaw) in N by the estimate's (position error in W, theta in B).
+
+    Derivation: positions turn by R_WtoN. With R_BtoW = R_hat exp(theta) and D = diag(1, -1, -1),
+        R_FtoN = R_WtoN R_hat exp(theta) D = (R_WtoN R_hat D) exp(D theta),
+    so the body error in F is D theta. For R = Rz(yaw) Ry(pitch) Rx(roll) a small body rotation phi changes the
+    angles by the Z-Y-X rate matrix (Diebel, "Representing attitude", 2006, eq. 76-78)
+        d(roll, pitch, yaw) = [[1, sr tp, cr tp], [0, cr, -sr], [0, sr / cp, cr / cp]] phi,
+    and times D its second and third columns change sign.
+    """
+    sr, cr, sp = math.sin(roll), math.cos(roll), math.sin(pitch)
+    cp = max(math.cos(pitch), _MIN_COS_PITCH)
+    J = np.zeros((6, 6))
+    J[:3, :3] = R_WtoN
+    J[3, 3], J[3, 4], J[3, 5] = 1.0, -sr * sp / cp, -cr * sp / cp
+    J[4, 4], J[4, 5] = -cr, sr
+    J[5, 4], J[5, 5] = -sr / cp, -cr / cp
+    return J
+
+
+@compiled(f"f8[::1]({_READ_ONLY}, {_READ_ONLY})")
 def turned_triangle(J: Array, covariance: Array) -> Array:
     """Return the upper triangle (21,), row by row, of J C J' for J (6, 6) and the first six of C's rows and columns."""
     half = np.zeros((6, 6))
@@ -114,19 +155,51 @@ def turned_triangle(J: Array, covariance: Array) -> Array:
     return triangle
 
 
-def pose_jacobian(R_WtoN: Array, roll: float, pitch: float) -> Array:
-    """Return J (6, 6): (dx dy dz droll dpitch dyaw) in N by the estimate's (position error in W, theta in B).
+@compiled(f"f4[::1]({_READ_ONLY}, {_READ_ONLY_1D}, {_READ_ONLY}, {_READ_ONLY})")
+def _turned_pose(R_WtoN: Array, p_BinW: Array, R_BtoW: Array, covariance: Array) -> Floats:
+    """Return p_BinN, roll pitch yaw of F in N, q_FtoN and the covariance's upper triangle, (31,).
 
-    Derivation: positions turn by R_WtoN. With R_BtoW = R_hat exp(theta) and D = diag(1, -1, -1),
-        R_FtoN = R_WtoN R_hat exp(theta) D = (R_WtoN R_hat D) exp(D theta),
-    so the body error in F is D theta. For R = Rz(yaw) Ry(pitch) Rx(roll) a small body rotation phi changes the
-    angles by the Z-Y-X rate matrix (Diebel, "Representing attitude", 2006, eq. 76-78)
-        d(roll, pitch, yaw) = [[1, sr tp, cr tp], [0, cr, -sr], [0, sr / cp, cr / cp]] phi,
-    and times D its second and third columns change sign.
+    Source: R_FtoN = R_WtoN R_BtoW diag(1, -1, -1); angles as `so3.to_euler`; the quaternion is the product of those of
+    the three turns, taken with w >= 0; covariance by `pose_jacobian`.
     """
-    sr, cr, sp = math.sin(roll), math.cos(roll), math.sin(pitch)
-    cp = max(math.cos(pitch), _MIN_COS_PITCH)
-    J = np.zeros((6, 6))
-    J[:3, :3] = R_WtoN
-    J[3:, 3:] = ((1.0, -sr * sp / cp, -cr * sp / cp), (0.0, -cr, sr), (0.0, -sr / cp, -cr / cp))
-    return J
+    R = np.zeros((3, 3))
+    out = np.zeros(31, np.float32)
+    for i in range(3):
+        place = 0.0
+        for k in range(3):
+            place += R_WtoN[i, k] * p_BinW[k]
+            for j in range(3):
+                R[i, j] += R_WtoN[i, k] * R_BtoW[k, j] * _FLIP[j]
+        out[i] = place
+    pitch = math.asin(max(-1.0, min(1.0, -R[2, 0])))
+    at_pole = abs(R[2, 0]) > _POLE
+    roll = 0.0 if at_pole else math.atan2(R[2, 1], R[2, 2])
+    yaw = math.atan2(-R[0, 1], R[1, 1]) if at_pole else math.atan2(R[1, 0], R[0, 0])
+    out[3], out[4], out[5] = roll, pitch, yaw
+    sr, cr, sp, cp = math.sin(roll / 2), math.cos(roll / 2), math.sin(pitch / 2), math.cos(pitch / 2)
+    sy, cy = math.sin(yaw / 2), math.cos(yaw / 2)
+    sign = 1.0 if cr * cp * cy + sr * sp * sy >= 0.0 else -1.0
+    out[6] = sign * (cr * cp * cy + sr * sp * sy)
+    out[7] = sign * (sr * cp * cy - cr * sp * sy)
+    out[8] = sign * (cr * sp * cy + sr * cp * sy)
+    out[9] = sign * (cr * cp * sy - sr * sp * cy)
+    out[10:] = turned_triangle(pose_jacobian(R_WtoN, roll, pitch), covariance)
+    return out
+
+
+@compiled(f"f4[::1]({_READ_ONLY}, {_READ_ONLY_1D}, {_READ_ONLY})")
+def _turned_velocity(R_WtoN: Array, v_BinW: Array, covariance: Array) -> Floats:
+    """Return v_BinN and its covariance row by row, (12,)."""
+    out = np.zeros(12, np.float32)
+    for i in range(3):
+        speed = 0.0
+        for k in range(3):
+            speed += R_WtoN[i, k] * v_BinW[k]
+        out[i] = speed
+        for j in range(3):
+            total = 0.0
+            for k in range(3):
+                for m in range(3):
+                    total += R_WtoN[i, k] * covariance[6 + k, 6 + m] * R_WtoN[j, m]
+            out[3 + 3 * i + j] = total
+    return out

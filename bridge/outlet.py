@@ -1,41 +1,68 @@
-"""The outlet: every link, what each one is sent, and the heartbeats."""
+"""The outlet: every link, the talk with the autopilot at its end, and what each one is sent."""
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from bridge.clock import Nanoseconds
+from bridge.dialogue import Dialogue, DialogueState, Ear, Terms
 from bridge.links import Link, open_link
-from bridge.pack import MESSAGES, Encoder, Identity, Packer, Reader, heartbeat
+from bridge.pack import MESSAGES, Encoder, Identity, Packer
 from bridge.wire import LinkState, Received, Sent
 from tracker.errors import OperatorError
 from tracker.types import Step
 
-HEARTBEAT_PERIOD_NS = 1_000_000_000
+_KEPT_MESSAGES = 8192
+DEFAULT_SYSTEM_ID = 1  # until an autopilot was heard, where the config names none
 
 
 @dataclass(slots=True, eq=False)
-class _Spout:
-    """One link with its message names, its reader, and when its next heartbeat is due (None: at once) [ns]."""
+class Spout:
+    """One link and the talk over it.
+
+    terms: of the talk.  encoder: the link's, which takes on the vehicle's system id if the terms name none.
+    """
 
     link: Link
-    messages: tuple[str, ...]
-    reader: Reader
-    heartbeat_due_ns: int | None = None
+    terms: Terms
+    encoder: Encoder | None = None
+    dialogue: Dialogue = field(init=False)
+    ear: Ear | None = field(default=None, init=False)
+
+    def __post_init__(self) -> None:
+        """Begin the talk."""
+        self.dialogue = Dialogue(self.terms)
+
+    def hear(self) -> list[Received]:
+        """Take in what has come since the last call, and return it."""
+        heard = [] if self.ear is None else self.ear.take()
+        if heard:
+            self.dialogue.take(heard)
+            peer = self.dialogue.peer
+            if peer is not None and self.encoder is not None and self.terms.vehicle_id is None:
+                self.encoder.speak_for(peer.system_id)
+        return heard
 
 
 class Outlet:
-    """Send each estimate once to every link, and a heartbeat a second of stream time.
+    """Send each estimate once to every link that may have it, and carry on the talk with each autopilot.
 
-    links: open links with the names (of `bridge.pack.MESSAGES`) each one is sent.
-    packer: makes messages of estimates.
+    spouts: open links, each with the terms of its talk.  packer: makes messages of estimates.
     """
 
-    def __init__(self, links: Sequence[tuple[Link, tuple[str, ...]]], packer: Packer) -> None:
-        self._spouts = [_Spout(link, messages, Reader()) for link, messages in links]
+    def __init__(self, spouts: Sequence[Spout], packer: Packer) -> None:
+        self._spouts = tuple(spouts)
         self._packer = packer
-        self._wanted = tuple(dict.fromkeys(name for _, messages in links for name in messages))
+        self._received: deque[tuple[str, Received]] = deque(maxlen=_KEPT_MESSAGES)
+        self._now_ns = 0
+
+    def listen(self, now: Nanoseconds) -> None:
+        """Hear from now on what comes in. now: reads stream time [ns], from any thread."""
+        for spout in self._spouts:
+            if spout.ear is None:
+                spout.ear = Ear(spout.link, now)
 
     def send(self, step: Step, now_ns: int) -> tuple[Sent, ...]:
         """Send what is due, and return what has left since the last call.
@@ -48,22 +75,27 @@ class Outlet:
         Returns:
             Records in the order of the links; links with a thread report a message in a later call.
         """
+        self._now_ns = now_ns
         for spout in self._spouts:
-            if spout.heartbeat_due_ns is None or now_ns >= spout.heartbeat_due_ns:
-                spout.link.send(heartbeat(now_ns))
-                spout.heartbeat_due_ns = _next_beat(spout.heartbeat_due_ns, now_ns)
+            self._received.extend((spout.link.name, message) for message in spout.hear())
+            for message in spout.dialogue.due(step.state, now_ns):
+                spout.link.send(message)
         for estimate in step.estimates:
-            packed = self._packer.messages(estimate, self._wanted)
-            for spout in self._spouts:
-                for name in spout.messages:
+            going = [spout for spout in self._spouts if spout.dialogue.admits(estimate, now_ns)]
+            wanted = dict.fromkeys(name for spout in going for name in spout.dialogue.messages)
+            packed = self._packer.messages(estimate, wanted)
+            for spout in going:
+                for name in spout.dialogue.messages:
                     spout.link.send(packed[name])
         return self._sent()
 
     def received(self) -> tuple[tuple[str, Received], ...]:
-        """Return the messages that came in since the last call, each with its link's URI."""
-        return tuple(
-            (spout.link.name, message) for spout in self._spouts for message in spout.reader.feed(spout.link.receive())
-        )
+        """Return the messages that came in up to the last `send` and were not yet returned, with their link's URI."""
+        return tuple(self._received.popleft() for _ in range(len(self._received)))
+
+    def far_ends(self) -> tuple[DialogueState, ...]:
+        """Return what was known of each link's far end at the last `send`, in the links' order."""
+        return tuple(spout.dialogue.state(self._now_ns) for spout in self._spouts)
 
     def link_states(self) -> tuple[LinkState, ...]:
         """Return how each link fares, in the order they were given."""
@@ -79,16 +111,9 @@ class Outlet:
         return tuple(record for spout in self._spouts for record in spout.link.sent())
 
 
-def _next_beat(due_ns: int | None, now_ns: int) -> int:
-    """Return the next heartbeat's time: on the grid of the earlier ones, unless that is past already."""
-    on_grid_ns = (now_ns if due_ns is None else due_ns) + HEARTBEAT_PERIOD_NS
-    return on_grid_ns if on_grid_ns > now_ns else now_ns + HEARTBEAT_PERIOD_NS
-
-
 def open_outlet(
-    links: Sequence[tuple[str, tuple[str, ...]]],
+    links: Sequence[tuple[str, Terms]],
     *,
-    system_id: int,
     component_id: int,
     room_yaw_deg: float,
     stopwatch: Nanoseconds,
@@ -96,30 +121,32 @@ def open_outlet(
     """Open every link and make the outlet of them.
 
     Args:
-        links: URIs (forms: `bridge.links.FORMS`), each with the names of the messages it is sent.
-        system_id, component_id: who speaks, see `bridge.pack.Identity`.
+        links: URIs (forms: `bridge.links.FORMS`), each with the terms of its talk.
+        component_id: who speaks, see `bridge.pack.Identity`; the system id is the vehicle's.
         room_yaw_deg: heading of the room's x axis, clockwise from north [deg].
         stopwatch: reads a running time [ns].
     Raises:
         OperatorError: a URI given twice, a message name not known, an id out of range, or a link that does not open.
     """
     _check(links)
-    identity = Identity(system_id, component_id)
     packer = Packer(room_yaw_deg)
-    opened: list[tuple[Link, tuple[str, ...]]] = []
+    spouts: list[Spout] = []
     try:
-        for uri, messages in links:
-            opened.append((open_link(uri, Encoder(identity), stopwatch), messages))
+        for uri, terms in links:
+            known = DEFAULT_SYSTEM_ID if terms.vehicle_id is None else terms.vehicle_id
+            encoder = Encoder(Identity(known, component_id))
+            spouts.append(Spout(open_link(uri, encoder, stopwatch), terms, encoder))
     except OperatorError:
-        for link, _ in opened:
-            link.close()
+        for spout in spouts:
+            spout.link.close()
         raise
-    return Outlet(opened, packer)
+    return Outlet(spouts, packer)
 
 
-def _check(links: Sequence[tuple[str, tuple[str, ...]]]) -> None:
+def _check(links: Sequence[tuple[str, Terms]]) -> None:
     uris = [uri for uri, _ in links]
-    for uri, messages in links:
+    for uri, terms in links:
+        messages = terms.messages or ()
         if uris.count(uri) > 1:
             raise OperatorError(f"link {uri}: given {uris.count(uri)} times; remove all but one")
         for name in messages:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import queue
 import threading
 from collections.abc import Callable, Mapping
 from contextlib import suppress
@@ -11,6 +10,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
+from bridge.backlog import Backlog
 from bridge.log.entry import Entry, make_entry
 from bridge.log.stream import open_stream
 from bridge.log.writer import Cover, LogWriter
@@ -19,12 +19,12 @@ from tracker.camera import Camera
 from tracker.rig import Marker
 from tracker.types import Event, Step
 
-FLUSH_S = 0.5  # an entry waits for the next one's flush or for the timeout, one after the other: under 1 s together
+# An entry waits at most 0.25 s in the backlog, then for a flush: 0.5 s of stream time, or 0.25 s without another entry.
 FLUSH_NS = 500_000_000
 CLOCK_NS = 1_000_000_000
 CAPACITY = 1024
 CLOSE_S = 10.0
-_CLOSE = None  # the queue's last item
+STALL_S = 0.5
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,13 +32,14 @@ class RecorderState:
     """How the recording stands.
 
     written: steps handed to the kernel.  dropped: steps that are not in the log and never will be.
-    size_bytes: of the log.  error: why recording stopped, in one line; None while all is well.
+    size_bytes: of the log.  error: why recording stopped, in one line; None while all is well.  path: as given.
     """
 
     written: int
     dropped: int
     size_bytes: int
     error: str | None
+    path: str = ""
 
 
 class Recorder:
@@ -78,7 +79,7 @@ class Recorder:
         self._block = block_when_full
         self._stream = open_stream(path, overwrite)
         self._cover = Cover(attachments, metadata, cameras, marker, wall_clock())
-        self._queue: queue.Queue[Entry | None] = queue.Queue(capacity)
+        self._backlog = Backlog(capacity)
         self._clock_due_ns: int | None = None
         self._closed = False
         self._error: str | None = None
@@ -104,24 +105,18 @@ class Recorder:
         error = self._error
         if error is None and not self._closed and not self._thread.is_alive():
             error = f"log {self._path}: the recorder's thread is gone, which is a bug; its traceback is on stderr"
-        return RecorderState(self._written, self._refused + self._lost, self._stream.size_bytes, error)
+        return RecorderState(self._written, self._refused + self._lost, self._stream.size_bytes, error, str(self._path))
 
     def close(self) -> None:
-        """Write what is queued, end the file properly and wait for it, at most 20 s. A second call does nothing."""
+        """Write what is queued, end the file properly and wait for it, at most 10 s. A second call does nothing."""
         if self._closed:
             return
         self._closed = True
-        with suppress(queue.Full):
-            self._queue.put(_CLOSE, timeout=CLOSE_S)
+        self._backlog.close()
         self._thread.join(CLOSE_S)
         if self._thread.is_alive():
-            waiting = self._pending + self._queue.qsize()
+            waiting = self._pending + len(self._backlog)
             self._error = f"log {self._path}: the disk did not take the last {waiting} steps; the log has no end"
-
-    @property
-    def path(self) -> Path:
-        """Return the log's path, as given."""
-        return self._path
 
     def __enter__(self) -> Self:
         return self
@@ -139,14 +134,11 @@ class Recorder:
 
     def _put(self, entry: Entry) -> bool:
         """Queue an entry; say whether it went in."""
-        while True:
-            try:
-                self._queue.put(entry, block=self._block, timeout=FLUSH_S)
-            except queue.Full:
-                if self._block and self._thread.is_alive():
-                    continue
+        while not self._backlog.put(entry):
+            if not self._block or not self._thread.is_alive():
                 return False
-            return True
+            self._backlog.wait_for_room(STALL_S)
+        return True
 
     def _begin(self) -> LogWriter | None:
         try:
@@ -168,14 +160,10 @@ class Recorder:
         """Write entries until the last."""
         flushed_ns: int | None = None
         warned = 0
-        while True:
-            try:
-                entry = self._queue.get(timeout=FLUSH_S)
-            except queue.Empty:
+        for entry in self._backlog.entries():
+            if entry is None:
                 self._flush(writer)
                 continue
-            if entry is _CLOSE:
-                break
             self._pending += 1
             writer.write(entry)
             if self._refused > warned:
@@ -201,6 +189,5 @@ class Recorder:
             self._stream.close()
 
     def _discard(self) -> None:
-        """Empty the queue until the last entry, so that nobody waits for a disk that failed."""
-        while self._queue.get() is not _CLOSE:
-            self._lost += 1
+        """Empty the backlog until the end, so that nobody waits for a disk that failed."""
+        self._lost += sum(entry is not None for entry in self._backlog.entries())

@@ -14,10 +14,10 @@ from typing import Protocol
 from bridge.clock import Clock
 from bridge.monitor import Monitor
 from bridge.outlet import Outlet
-from bridge.recorder import Recorder
+from bridge.recorder import RecorderState
 from bridge.status import Reading, StatusLine
 from bridge.summary import LogSummary, Summary
-from bridge.telemetry.states import LogState, Surroundings
+from bridge.telemetry.states import LogState, Surroundings, surroundings_of
 from bridge.telemetry.telemetry import Telemetry
 from bridge.wire import Sent
 from tracker.types import Event, Rejected, Step
@@ -33,13 +33,26 @@ class Steps(Protocol):
         """Give what was still held back when the events ended."""
 
 
+class Records(Protocol):
+    """What keeps every step: `bridge.recorder.Recorder`."""
+
+    def take(self, event: Event | None, step: Step, sent: tuple[Sent, ...], now_ns: int) -> None:
+        """Keep one turn of the loop."""
+
+    def state(self) -> RecorderState:
+        """Say how the recording stands."""
+
+    def close(self) -> None:
+        """End the recording properly."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Outlets:
     """Where a run's results go: the autopilots, the figures, and if wanted the log, the screen and who watches."""
 
     links: Outlet
     monitor: Monitor
-    recorder: Recorder | None = None
+    recorder: Records | None = None
     status: StatusLine | None = None
     telemetry: Telemetry | None = None
 
@@ -57,8 +70,8 @@ class Outlets:
         log = None
         if self.recorder is not None:
             state = self.recorder.state()
-            log = LogState(str(self.recorder.path), state.size_bytes, state.written, state.dropped, state.error or "")
-        return Surroundings(self.links.link_states(), log)
+            log = LogState(state.path, state.size_bytes, state.written, state.dropped, state.error or "")
+        return surroundings_of(self.links.link_states(), self.links.far_ends(), log)
 
     def summary(self, log_path: str | None) -> Summary:
         """Return the run's figures; log_path names the log."""
@@ -66,7 +79,7 @@ class Outlets:
         if self.recorder is not None and log_path is not None:
             state = self.recorder.state()
             log = LogSummary(log_path, state.written, state.dropped, state.error or "")
-        return self.monitor.summary(self.links.link_states(), log)
+        return self.monitor.summary(self.links.link_states(), log, self.links.far_ends())
 
 
 def run(events: Iterable[Event], tracker: Steps, clock: Clock, outlets: Outlets) -> None:
@@ -76,6 +89,7 @@ def run(events: Iterable[Event], tracker: Steps, clock: Clock, outlets: Outlets)
         events: frames in the order they are to be worked on.
         clock: stream time, in the base of the frames' own.
     """
+    outlets.links.listen(clock.now_ns)
     for event in events:
         if not isinstance(event, Rejected):
             clock.follow(event)
@@ -112,5 +126,6 @@ def _enter(event: Event | None, step: Step, sent: tuple[Sent, ...], now_ns: int,
 
 
 def _reading(outlets: Outlets) -> Reading:
+    links = outlets.links
     alarms = () if outlets.telemetry is None else outlets.telemetry.alarms()
-    return outlets.monitor.reading(outlets.links.link_states(), outlets.log_state(), alarms)
+    return outlets.monitor.reading(links.link_states(), outlets.log_state(), links.far_ends(), alarms)

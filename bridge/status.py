@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from types import TracebackType
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType, TracebackType
 from typing import Self
 
 from rich.console import Console
@@ -12,6 +12,7 @@ from rich.live import Live
 from rich.text import Text
 
 from bridge.clock import Nanoseconds
+from bridge.summary import ClockOffset
 
 REDRAW_NS = 200_000_000
 PLAIN_LINE_NS = 5_000_000_000
@@ -24,8 +25,10 @@ class Reading:
     state: the track's state in a word.  rate_hz: estimates sent a second of stream time [Hz].
     latency_p50_ms, latency_p99_ms: frame available to datagram handed over [ms].
     position_m: x, y, z of the body in the room [m].  nis: of the last update, over its degrees of freedom.
-    links_up, links: how many links deliver, of how many.  log: the log's state in a word or two.
     alarm, alarms: the alarm that matters most, "" for none, and how many stand.
+    clocks: offsets of the cameras' clocks, those that are certainly not zero, by camera name.
+    links_up, links: how many links deliver, of how many.  far_ends: the autopilots there, in a word or two each.
+    log: the log's state in a word or two.
     """
 
     state: str
@@ -39,6 +42,8 @@ class Reading:
     log: str
     alarm: str = ""
     alarms: int = 0
+    far_ends: tuple[str, ...] = ()
+    clocks: Mapping[str, ClockOffset] = field(default_factory=lambda: MappingProxyType({}))
 
 
 class StatusLine:
@@ -90,10 +95,13 @@ class StatusLine:
 
 def _line(reading: Reading) -> Text:
     position = "-" if reading.position_m is None else " ".join(f"{metres:+.3f}" for metres in reading.position_m)
+    clocks = "".join(f"clock {name} {offset} | " for name, offset in reading.clocks.items())
+    far_ends = "".join(f" {far_end}" for far_end in reading.far_ends)
     return Text(
-        f"{_alarm(reading)}{reading.state:<9} {reading.rate_hz:5.1f} Hz | latency p50 {_figure(reading.latency_p50_ms)} "
-        f"p99 {_figure(reading.latency_p99_ms)} ms | x y z {position} m | NIS {_figure(reading.nis)} | "
-        f"links {reading.links_up}/{reading.links} | log {reading.log}",
+        f"{_alarm(reading)}{reading.state:<9} {reading.rate_hz:5.1f} Hz | "
+        f"latency p50 {_figure(reading.latency_p50_ms)} p99 {_figure(reading.latency_p99_ms)} ms | "
+        f"x y z {position} m | NIS {_figure(reading.nis)} | "
+        f"{clocks}links {reading.links_up}/{reading.links}{far_ends} | log {reading.log}",
         overflow="ellipsis",
         no_wrap=True,
     )

@@ -13,6 +13,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from bridge.dialogue import DialogueState
 from bridge.wire import LinkState
 
 
@@ -35,6 +36,22 @@ NO_SAMPLES = Percentiles()
 
 
 @dataclass(frozen=True, slots=True)
+class ClockOffset:
+    """A camera's clock against the first camera's, and one sigma of that [ms]."""
+
+    offset_ms: float
+    sigma_ms: float
+
+    @property
+    def is_certain(self) -> bool:
+        """Say whether it is other than zero beyond three sigma."""
+        return abs(self.offset_ms) > 3.0 * self.sigma_ms
+
+    def __str__(self) -> str:
+        return f"{self.offset_ms:+.2f} +- {self.sigma_ms:.2f} ms"
+
+
+@dataclass(frozen=True, slots=True)
 class LogSummary:
     """The log: its file, records written, records dropped, and what ended it early, if anything did."""
 
@@ -54,6 +71,8 @@ class Summary:
     worst_gap_ms: longest stream time between two estimates sent in a row [ms]; None with fewer than two.
     frames: images seen, by camera name.  rejected: what was left out, by reason.
     lost: how often the track was lost.  resets: how often the estimate jumped.
+    clocks: how much later than its stamp each camera but the first saw, by the first one's clock, by camera name.
+    far_ends: what is known of the autopilot at the end of each link.
     """
 
     estimates_sent: int
@@ -65,7 +84,9 @@ class Summary:
     rejected: Mapping[str, int] = field(default_factory=_empty)
     lost: int = 0
     resets: int = 0
+    clocks: Mapping[str, ClockOffset] = field(default_factory=_empty)
     links: tuple[LinkState, ...] = ()
+    far_ends: tuple[DialogueState, ...] = ()
     log: LogSummary | None = None
 
 
@@ -81,7 +102,8 @@ def to_text(summary: Summary) -> RenderableType:
         _latencies(summary.latency_ms, summary.stages_ms),
         Text(f"frames      {_counts(summary.frames)}"),
         Text(f"rejected    {_counts(summary.rejected)}"),
-        *map(_link, summary.links),
+        *([Text(f"clocks      {_clocks(summary.clocks)}")] if summary.clocks else ()),
+        *map(_link, summary.links, summary.far_ends or ("",) * len(summary.links)),
         *(_log(log) for log in (summary.log,) if log is not None),
     )
 
@@ -104,15 +126,20 @@ def _latencies(total: Percentiles, stages: Mapping[str, Percentiles]) -> Table:
     return table
 
 
-def _link(link: LinkState) -> Text:
+def _link(link: LinkState, far_end: DialogueState | str) -> Text:
     state = "up" if link.up else f"down, {link.reason}"
+    far = f"\n            {far_end}" if far_end else ""
     superseded = f", {link.superseded} superseded" if link.superseded else ""
-    return Text(f"link        {link.name}: {state}, {link.sent} sent, {link.dropped} dropped{superseded}")
+    return Text(f"link        {link.name}: {state}, {link.sent} sent, {link.dropped} dropped{superseded}{far}")
 
 
 def _log(log: LogSummary) -> Text:
     error = f", ended early: {log.error}" if log.error else ""
     return Text(f"log         {log.path}: {log.written} records, {log.dropped} dropped{error}")
+
+
+def _clocks(clocks: Mapping[str, ClockOffset]) -> str:
+    return ", ".join(f"{name} {offset}" for name, offset in clocks.items()) + " against the first camera's"
 
 
 def _counts(counts: Mapping[str, int]) -> str:

@@ -20,6 +20,7 @@ from tracker.errors import OperatorError
 
 EXIT_PATH_NOT_HELD = 1
 EXIT_COLOURS_NOT_GOOD = 1
+EXIT_FLIGHT_NOT_GOOD = 1
 EXIT_OPERATOR = 2
 EXIT_INTERRUPTED = 130
 STDOUT = Path("-")
@@ -86,6 +87,12 @@ def _clocks() -> Clocks:
     return Clocks(monotonic=time.monotonic_ns, stopwatch=time.perf_counter_ns, wall=time.time_ns, sleep_s=time.sleep)
 
 
+def _tell_of_compiling() -> None:
+    from tools.first_start import tell_of_compiling
+
+    tell_of_compiling(lambda line: typer.echo(f"posebridge: {line}", err=True))
+
+
 def _print_version(wanted: bool) -> None:
     if wanted:
         try:
@@ -131,6 +138,7 @@ def run(
     quiet: Annotated[bool, typer.Option("--quiet", help="Show no status line and no summary.")] = False,
 ) -> None:
     """Track the vehicle and send its pose to the autopilot; Ctrl-C ends it."""
+    _tell_of_compiling()
     from bridge.settings import load_settings
 
     settings = load_settings(config).with_links(tuple(link or ()))
@@ -156,6 +164,7 @@ def demo(
     """
     request = DemoRequest(duration_s, seed, out, pace)
 
+    _tell_of_compiling()
     from tools.demo import run_demo
 
     if not run_demo(request, _clocks()).verdict.passed:
@@ -207,6 +216,7 @@ def colours(
 
     Carry the vehicle slowly through the room meanwhile. Exit code 1 when the colours are not good to fly with.
     """
+    _tell_of_compiling()
     from tools.colours.command import ColoursRequest, run_colours
 
     request = ColoursRequest(config, source, frames, picture, write, overwrite, json)
@@ -221,6 +231,7 @@ def accuracy(
     json: JsonOption = False,
 ) -> None:
     """Compare estimates with the truth, by the filter and by the paper's own method."""
+    _tell_of_compiling()
     from bridge.settings import load_settings
     from tools.bench.commands import bench_accuracy
 
@@ -234,9 +245,10 @@ def speed(
     json: JsonOption = False,
 ) -> None:
     """Time tracking and acquisition with the frames in memory."""
+    _tell_of_compiling()
     from bridge.settings import load_settings
     from tools.bench.commands import bench_speed
-    from tools.bench.speed import CpuClocks
+    from tools.bench.meter import CpuClocks
 
     cpu = CpuClocks(process=time.process_time_ns, thread=time.thread_time_ns)
     bench_speed(pairs, load_settings(config), _clocks(), cpu, json)
@@ -249,6 +261,7 @@ def memory(
     json: JsonOption = False,
 ) -> None:
     """Watch the process's size over a long run with link and log."""
+    _tell_of_compiling()
     from bridge.settings import load_settings
     from tools.bench.commands import bench_memory
 
@@ -262,6 +275,7 @@ def consistency(
     json: JsonOption = False,
 ) -> None:
     """Fly many simulated flights and see whether the filter's covariance is true."""
+    _tell_of_compiling()
     from tools.bench.commands import bench_consistency
 
     bench_consistency(seeds, gamma, json)
@@ -274,7 +288,37 @@ def rooms(
     json: JsonOption = False,
 ) -> None:
     """Track simulated flights in other light, through other cameras, at other speeds."""
+    _tell_of_compiling()
     from bridge.settings import load_settings
     from tools.bench.commands import bench_rooms
 
     bench_rooms(load_settings(config), seed, json)
+
+
+@app.command()
+def sitl(
+    binary: Annotated[
+        Path | None,
+        typer.Option(help="ArduPilot's SITL program (docs/sitl.md); else the project's simulated autopilot."),
+    ] = None,
+    connect: Annotated[
+        str | None,
+        typer.Option(help="tcp:HOST:PORT of SERIAL0 of ArduPilot's SITL that runs already.", metavar="URI"),
+    ] = None,
+    frame: Annotated[str, typer.Option(help="The vehicle: heli.")] = "heli",
+    config: ConfigOption = "lab",
+    faults: Annotated[bool, typer.Option("--faults", help="Rehearse what may go wrong, in the air.")] = False,
+    out: Annotated[Path, typer.Option(help="Folder for log and report.", metavar="DIR")] = Path("logs/sitl"),
+) -> None:
+    """Fly an autopilot's own software on simulated cameras: origin, arming, hover, square, landing.
+
+    Exit code 0 only if every figure keeps its limit; else 1.
+    """
+    from tools.sitl.session import SitlRequest
+
+    request = SitlRequest(binary, frame, config, out, faults, connect=connect)
+
+    from tools.sitl.command import run_sitl
+
+    if not run_sitl(request, _clocks()).verdict.passed:
+        raise typer.Exit(EXIT_FLIGHT_NOT_GOOD)

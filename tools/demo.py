@@ -7,8 +7,9 @@ Nothing but those datagrams leads back to the helicopter.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from rich.console import Console
@@ -18,7 +19,8 @@ from bridge.monitor import Monitor
 from bridge.outlet import Outlet, open_outlet
 from bridge.pace import Paced
 from bridge.run import Outlets, Steps, close, run
-from bridge.settings import DEFAULT_MESSAGES, Settings, load_settings, rig_of
+from bridge.settings import Settings, load_settings, rig_of
+from bridge.settings.terms import terms_of
 from bridge.status import StatusLine
 from bridge.summary import Summary, to_text
 from bridge.wire import Sent
@@ -26,12 +28,13 @@ from tools.demo_plot import draw_flight
 from tools.request import Clocks, DemoRequest, Pace
 from tools.seen_picture import draw_seen
 from tools.session import recorder_of, telemetry_of, tracker_of
-from tools.simulate.autopilot import Mode
+from tools.simulate.autopilot.vessel import Mode
 from tools.simulate.flight import Flight, flight_of
 from tools.simulate.helicopter import Helicopter
 from tools.simulate.mission import Mission
 from tools.simulate.verdict import Verdict, judge
 from tools.simulate.world import Surroundings, World
+from tools.steady import steady
 from tools.summary_file import write_summary
 from tracker.errors import OperatorError
 from tracker.rig import Rig
@@ -42,6 +45,11 @@ from tracker.types import Estimate, Event, Frame, Step
 LOG, SUMMARY, VERDICT, PLOT, SEEN = "flight.mcap", "summary.json", "verdict.json", "flight.png", "seen.png"
 DEMO_CONFIG = "lab"
 _RATE_HZ = 15.0
+_PATIENCE_NS = 3_600_000_000_000  # the world waits while this computer is busy, so a pose is never as old as it seems
+_TALK_S = 10.0
+"""At most so long may bridge and autopilot talk before the flight: of the origin, until the filter trusts the poses."""
+
+_REST_NS = 1_000_000_000
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -151,7 +159,7 @@ def _fly(
 ) -> tuple[_Witness, Summary]:
     """Run the loop once around."""
     rig = rig_of(settings, None).rig
-    timing = SimTiming(_RATE_HZ, request.duration_s, START_NS, delay_ns=world.surroundings.delay_ns)
+    timing = SimTiming(_RATE_HZ, request.duration_s + _TALK_S, START_NS, delay_ns=world.surroundings.delay_ns)
     log = request.out / LOG
     with ExitStack() as stack:
         source = stack.enter_context(SimSource(rig, world, clocks.stopwatch, timing, seed=request.seed))
@@ -167,9 +175,11 @@ def _fly(
         telemetry = telemetry_of("demo", settings, rig, monitor, clocks)
         outlets = Outlets(outlet, monitor, recorder, status, telemetry)
         clock: Clock = StreamClock() if fast else HostClock(clocks.monotonic, START_NS)
-        events = source if fast else Paced(source, clock, clocks.sleep_s, clocks.stopwatch)
+        frames = _until_landed(source, world)
+        events = frames if fast else Paced(frames, clock, clocks.sleep_s, clocks.stopwatch)
         try:
-            run(events, witness, clock, outlets)
+            with steady():
+                run(events, witness, clock, outlets)
         finally:
             close(clock, outlets)
     if isinstance(events, Paced) and events.worst_lag_ns > 1e9 / _RATE_HZ:
@@ -179,11 +189,23 @@ def _fly(
     return witness, outlets.summary(str(log))
 
 
+def _until_landed(source: SimSource, world: World) -> Iterator[Event]:
+    """Yield the frames until the vehicle has stood for a second after its landing."""
+    landed_ns: int | None = None
+    for event in source:
+        yield event
+        now_ns = world.history[-1].t_ns
+        if world.autopilot.mode is Mode.LANDED:
+            landed_ns = now_ns if landed_ns is None else landed_ns
+            if now_ns - landed_ns >= _REST_NS:
+                return
+
+
 def _outlet(settings: Settings, world: World, clocks: Clocks) -> Outlet:
     """Open the one link: to the simulated autopilot, in place of those the config names."""
+    ((_, terms),) = terms_of(settings.with_links(("demo",)))
     return open_outlet(
-        [(f"udpout:127.0.0.1:{world.autopilot.port}", DEFAULT_MESSAGES)],
-        system_id=settings.mavlink.system_id,
+        [(f"udpout:127.0.0.1:{world.autopilot.port}", replace(terms, max_age_ns=_PATIENCE_NS))],
         component_id=settings.mavlink.component_id,
         room_yaw_deg=world.surroundings.room_yaw_deg,
         stopwatch=clocks.stopwatch,

@@ -19,6 +19,7 @@ from bridge.pace import Paced, first_time_ns
 from bridge.recorder import Recorder
 from bridge.run import Outlets, Steps, close, run
 from bridge.settings import Settings
+from bridge.settings.terms import terms_of
 from bridge.settings.tuning import tuning_of
 from bridge.status import StatusLine
 from bridge.summary import Summary, to_text
@@ -28,6 +29,7 @@ from bridge.telemetry.snapshot import About
 from bridge.telemetry.telemetry import Telemetry
 from tools.open_source import OpenedSource, open_source
 from tools.request import Clocks, Pace, RunRequest
+from tools.steady import steady
 from tools.summary_file import check_summary_path, write_summary
 from tracker.errors import OperatorError
 from tracker.paper import PaperTracker
@@ -63,7 +65,9 @@ def run_session(request: RunRequest, clocks: Clocks) -> None:
         events, clock = _paced(opened, request.pace, clocks)
         refused = False
         try:
-            run(events, tracker_of(request.settings, opened.chosen.rig, clocks), clock, outlets)
+            tracker = tracker_of(request.settings, opened.chosen.rig, clocks)
+            with steady():
+                run(events, tracker, clock, outlets)
         except OperatorError:
             refused = True  # its one line says it all
             raise
@@ -104,8 +108,7 @@ def tracker_of(settings: Settings, rig: Rig, clocks: Clocks) -> Steps:
 def links_of(settings: Settings, clocks: Clocks) -> Outlet:
     """Open the links that the config or the command line names."""
     return open_outlet(
-        [(link.uri, tuple(link.messages)) for link in settings.links],
-        system_id=settings.mavlink.system_id,
+        terms_of(settings),
         component_id=settings.mavlink.component_id,
         room_yaw_deg=settings.room.room_yaw_deg,
         stopwatch=clocks.stopwatch,

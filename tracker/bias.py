@@ -7,8 +7,13 @@ about it.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from tracker.compiled import compiled
+from tracker.correction import inverse_of
+from tracker.measure import camera_table
 from tracker.rig import Rig
 from tracker.state import State
 from tracker.types import Array
@@ -24,13 +29,28 @@ def shared_covariance(state: State, rig: Rig, exposure_s: float) -> Array:
         f / d (I - u u'), u the ray, d the distance; so the covariance is (sum (f / d s)^2 (I - u u'))^-1. s grows with
         the streak f / d |(I - u u') v| exposure.
     """
-    information = np.zeros((3, 3))
-    for camera in rig.cameras:
-        reach = state.p_BinW - camera.p_CinW
-        distance_m = float(np.linalg.norm(reach))
-        u = reach / distance_m
-        across = np.eye(3) - np.outer(u, u)
-        scale = camera.focal_px / distance_m
-        streak_px = scale * float(np.linalg.norm(across @ state.v_BinW)) * exposure_s
-        information += (scale**2 / (LIGHT_PX**2 + (STREAK_SHARE * streak_px) ** 2)) * across
-    return np.asarray(np.linalg.inv(information))
+    return _shared(state.mean, camera_table(rig), exposure_s)
+
+
+@compiled("f8[:, ::1](f8[::1], f8[:, ::1], f8)")
+def _shared(mean: Array, table: Array, exposure_s: float) -> Array:
+    """Return what `shared_covariance` does, of a `State.mean` and a `camera_table`."""
+    information, u = np.zeros((3, 3)), np.empty(3)
+    for c in range(len(table)):
+        distance2, speed2, along = 0.0, 0.0, 0.0
+        for i in range(3):
+            u[i] = mean[i] - table[c, 21 + i]
+            distance2 += u[i] * u[i]
+        distance_m = math.sqrt(distance2)
+        u /= distance_m
+        for i in range(3):
+            speed2 += mean[12 + i] * mean[12 + i]
+            along += mean[12 + i] * u[i]
+        scale = (table[c, 0] + table[c, 1]) / 2.0 / distance_m
+        streak_px = scale * math.sqrt(max(speed2 - along * along, 0.0)) * exposure_s
+        weight = scale**2 / (LIGHT_PX**2 + (STREAK_SHARE * streak_px) ** 2)
+        for i in range(3):
+            information[i, i] += weight
+            for j in range(3):
+                information[i, j] -= weight * u[i] * u[j]
+    return inverse_of(information)

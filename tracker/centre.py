@@ -51,16 +51,24 @@ class Centre:
     misfit: float
 
 
-@compiled("void(f8[:, ::1], f8[:, ::1], f8[:, ::1])")
-def _fill(pixels: Array, value: Array, model: Array) -> None:
-    """Fill in the model's rows (p + 3, n): the shapes (p, n), and the background's plane where the ball is not."""
-    p = len(value)
-    model[:p] = value
+@compiled("void(f8[:, ::1], Array(float32, 3, 'C', True), i8, f8, f8, i8[:, ::1], i8, i8, f8[:, ::1])")
+def _draw_at(
+    pixels: Array, fine: NDArray[np.float32], per_px: int, drawn_px: float, radius_px: float,
+    places: NDArray[np.int64], u_steps: int, v_steps: int, drawn: Array,
+) -> None:  # fmt: skip
+    """Draw the ball on a patch (..., n) with its centre at (u_steps, v_steps) / per_px.
+
+    Fills in drawn (3p + 3, n): the model, which is the shapes (p) and the background's plane where the ball is not,
+    then the shapes' slopes (p) by the centre's u, and by its v.
+    """
+    p = fine.shape[2]
+    value, by_u, by_v = drawn[:p], drawn[p + PLANE : 2 * p + PLANE], drawn[2 * p + PLANE :]
+    read(fine, per_px, drawn_px, radius_px, u_steps, v_steps, places, pixels, value, by_u, by_v)
     for i in range(pixels.shape[1]):
-        bare = 1.0 - value[0, i]
-        model[p, i] = bare
-        model[p + 1, i] = bare * pixels[X, i]
-        model[p + 2, i] = bare * pixels[Y, i]
+        bare = 1.0 - drawn[0, i]
+        drawn[p, i] = bare
+        drawn[p + 1, i] = bare * pixels[X, i]
+        drawn[p + 2, i] = bare * pixels[Y, i]
 
 
 @compiled("void(f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1])")
@@ -150,36 +158,20 @@ def _add_channel(
     normal[2] -= dot(T_v, T_v)
 
 
-@compiled(
-    "void(f8[:, ::1], Array(float32, 3, 'C', True), i8, i8, f8, f8, i8[:, ::1], i8, i8, f8[::1], f8[::1], f8[::1])"
-)
-def _linearise(
-    pixels: Array,
-    fine: NDArray[np.float32],
-    per_px: int,
-    reach: int,
-    drawn_px: float,
-    radius_px: float,
-    places: NDArray[np.int64],
-    u_steps: int,
-    v_steps: int,
-    tukey: Array,
-    squares: Array,
-    normal: Array,
-) -> None:
-    """Linearise the brightness or the colour of a patch about a centre at (u_steps, v_steps) / per_px.
+@compiled("void(f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1])")
+def _linearise(pixels: Array, drawn: Array, tukey: Array, squares: Array, normal: Array) -> None:
+    """Linearise the brightness or the colour of a patch about the centre that a ball was drawn at, see `_draw_at`.
 
     Fills in squares (n,) and normal (5,) as `_add_channel` does.
     """
-    count, p, channels = pixels.shape[1], fine.shape[2], len(pixels) - LUMA
-    weight = (tukey * pixels[TRUST]) ** 2
-    model = np.empty((p + PLANE, count))
-    value, by_u, by_v = np.empty((p, count)), np.empty((p, count)), np.empty((p, count))
+    count, p, channels = pixels.shape[1], (len(drawn) - PLANE) // 3, len(pixels) - LUMA
+    weight = np.empty(count)
+    for i in range(count):
+        weight[i] = (tukey[i] * pixels[TRUST, i]) ** 2
+    model, by_u, by_v = drawn[: p + PLANE], drawn[p + PLANE : 2 * p + PLANE], drawn[2 * p + PLANE :]
     factor, coefficients = np.empty((p + PLANE, p + PLANE)), np.empty((channels, p + PLANE))
     squares[:] = 0.0
     normal[:] = 0.0
-    read(fine, per_px, reach, drawn_px, radius_px, u_steps, v_steps, places, pixels, value, by_u, by_v)
-    _fill(pixels, value, model)
     _fit_linear(pixels, model, weight, factor, coefficients)
     for channel in range(channels):
         c = coefficients[channel]
@@ -206,12 +198,11 @@ def _doubt(squares: Array, channels: int, tukey: Array) -> None:
         tukey[i] = max(LEAST_WEIGHT, 1.0 - squares[i] / channels / (TUKEY**2 * scale))
 
 
-@compiled("f8[:, ::1](f8[:, ::1], Array(float32, 3, 'C', True), i8, i8, f8, f8, i8[:, ::1], i8, i8)")
+@compiled("f8[:, ::1](f8[:, ::1], Array(float32, 3, 'C', True), i8, f8, f8, i8[:, ::1], i8, i8)")
 def _slopes_at(
     pixels: Array,
     fine: NDArray[np.float32],
     per_px: int,
-    reach: int,
     drawn_px: float,
     radius_px: float,
     places: NDArray[np.int64],
@@ -220,24 +211,21 @@ def _slopes_at(
 ) -> Array:
     """Return the slopes (2, n) of the brightness, as fitted, by a centre on the grid [1/px]."""
     count, p = pixels.shape[1], fine.shape[2]
-    value, by_u, by_v = np.empty((p, count)), np.empty((p, count)), np.empty((p, count))
-    model, weight = np.empty((p + PLANE, count)), pixels[TRUST] ** 2
+    drawn, weight = np.empty((3 * p + PLANE, count)), pixels[TRUST] ** 2
     factor, coefficients = np.empty((p + PLANE, p + PLANE)), np.empty((1, p + PLANE))
-    read(fine, per_px, reach, drawn_px, radius_px, u_steps, v_steps, places, pixels, value, by_u, by_v)
-    _fill(pixels, value, model)
-    _fit_linear(pixels, model, weight, factor, coefficients)
+    _draw_at(pixels, fine, per_px, drawn_px, radius_px, places, u_steps, v_steps, drawn)
+    _fit_linear(pixels, drawn[: p + PLANE], weight, factor, coefficients)
     slopes = np.empty((2, count))
-    _slope(pixels, by_u, coefficients[0], slopes[0])
-    _slope(pixels, by_v, coefficients[0], slopes[1])
+    _slope(pixels, drawn[p + PLANE : 2 * p + PLANE], coefficients[0], slopes[0])
+    _slope(pixels, drawn[2 * p + PLANE :], coefficients[0], slopes[1])
     return slopes
 
 
-@compiled("f8(f8[:, ::1], Array(float32, 3, 'C', True), i8, i8, f8, f8, i8[:, ::1], i8, i8)")
+@compiled("f8(f8[:, ::1], Array(float32, 3, 'C', True), i8, f8, f8, i8[:, ::1], i8, i8)")
 def _squares_at(
     pixels: Array,
     fine: NDArray[np.float32],
     per_px: int,
-    reach: int,
     drawn_px: float,
     radius_px: float,
     places: NDArray[np.int64],
@@ -246,11 +234,10 @@ def _squares_at(
 ) -> float:
     """Return the sum of squares left in brightness or colour at a centre on the grid."""
     count, p, channels = pixels.shape[1], fine.shape[2], len(pixels) - LUMA
-    value, by_u, by_v = np.empty((p, count)), np.empty((p, count)), np.empty((p, count))
-    model, weight = np.empty((p + PLANE, count)), pixels[TRUST] ** 2
+    drawn, weight = np.empty((3 * p + PLANE, count)), pixels[TRUST] ** 2
     factor, coefficients = np.empty((p + PLANE, p + PLANE)), np.empty((channels, p + PLANE))
-    read(fine, per_px, reach, drawn_px, radius_px, u_steps, v_steps, places, pixels, value, by_u, by_v)
-    _fill(pixels, value, model)
+    _draw_at(pixels, fine, per_px, drawn_px, radius_px, places, u_steps, v_steps, drawn)
+    model = drawn[: p + PLANE]
     _fit_linear(pixels, model, weight, factor, coefficients)
     total = 0.0
     for channel in range(channels):
@@ -261,7 +248,7 @@ def _squares_at(
 
 
 @compiled(
-    "void(f8[:, ::1], f8[:, ::1], Array(float32, 3, 'C', True), Array(float32, 3, 'C', True), i8, i8, f8, f8,"
+    "void(f8[:, ::1], f8[:, ::1], Array(float32, 3, 'C', True), Array(float32, 3, 'C', True), i8, f8, f8,"
     "i8[:, ::1], f8, f8, f8[::1])"
 )
 def gauss_newton(
@@ -270,7 +257,6 @@ def gauss_newton(
     luma: NDArray[np.float32],
     chroma: NDArray[np.float32],
     per_px: int,
-    reach: int,
     drawn_px: float,
     radius_px: float,
     places: NDArray[np.int64],
@@ -281,18 +267,19 @@ def gauss_newton(
     """Fit from a start (u, v), pixels from the patch's middle; fill in u, v, covariance uu, uv, vv and misfit."""
     limit = 3 * per_px // 2  # a centre further from the middle pixel has run away
     p, n_bright, n_colour = luma.shape[2], bright.shape[1], colour.shape[1]
-    tukey_b, tukey_c, squares_b, squares_c = (
-        np.ones(n_bright),
-        np.ones(n_colour),
-        np.empty(n_bright),
-        np.empty(n_colour),
-    )
-    normal, normal_c = np.empty(5), np.empty(5)
+    drawn_b, drawn_c = np.empty((3 * p + PLANE, n_bright)), np.empty((3 * p + PLANE, n_colour))
+    tukey_b, squares_b, normal = np.ones(n_bright), np.empty(n_bright), np.empty(5)
+    tukey_c, squares_c, normal_c = np.ones(n_colour), np.empty(n_colour), np.empty(5)
     misfit = det = 0.0
+    at_u = at_v = limit + 1  # where the ball is drawn: nowhere yet
     for iteration in range(ITERATIONS):
         us, vs = max(-limit, min(limit, round(u * per_px))), max(-limit, min(limit, round(v * per_px)))
-        _linearise(bright, luma, per_px, reach, drawn_px, radius_px, places, us, vs, tukey_b, squares_b, normal)
-        _linearise(colour, chroma, per_px, reach, drawn_px, radius_px, places, us, vs, tukey_c, squares_c, normal_c)
+        if us != at_u or vs != at_v:
+            _draw_at(bright, luma, per_px, drawn_px, radius_px, places, us, vs, drawn_b)
+            _draw_at(colour, chroma, per_px, drawn_px, radius_px, places, us, vs, drawn_c)
+            at_u, at_v = us, vs
+        _linearise(bright, drawn_b, tukey_b, squares_b, normal)
+        _linearise(colour, drawn_c, tukey_c, squares_c, normal_c)
         misfit_b = _misfit(squares_b, tukey_b, 1, p, normal)
         misfit_c = _misfit(squares_c, tukey_c, 2, p, normal_c)
         misfit = (misfit_b * n_bright + misfit_c * 2 * n_colour) / (n_bright + 2 * n_colour)
@@ -329,12 +316,10 @@ def fit_centre(image: Image, ball: Expected) -> Centre | Reason:
     if not fits_in(image, extent):
         return Reason.AT_BORDER
     patch, streak_px, fit = cut(image, extent, ball.response), ball.streak_px, np.empty(6)
-    luma = template_for(ball.radius_px, ball.response.luma_px, ball.shades, extent.half, streak_px)
-    chroma = template_for(
-        ball.radius_px, ball.response.chroma_px, ball.shades, extent.half, streak_px, ball.response.block_px
-    )
+    luma = template_for(ball.radius_px, ball.response.luma_px, ball.shades)
+    chroma = template_for(ball.radius_px, ball.response.chroma_px, ball.shades, ball.response.block_px)
     n, places = luma.per_px, places_along(streak_px, luma.per_px)
-    shapes = luma.fine, chroma.fine, n, luma.reach, luma.radius_px
+    shapes = luma.fine, chroma.fine, n, luma.radius_px
     gauss_newton(patch.bright, patch.colour, *shapes, ball.radius_px, places, extent.du, extent.dv, fit)
     du, dv, cov_uu, cov_uv, cov_vv, misfit = fit.tolist()
     if not math.hypot(du - extent.du, dv - extent.dv) <= MAX_SHIFT_PX:
@@ -350,18 +335,17 @@ def misfit_at(patch: Patch, ball: Expected, centre: tuple[float, float], group: 
     """
     bright = group is Group.BRIGHTNESS
     blur_px, box_px = (ball.response.luma_px, 1) if bright else (ball.response.chroma_px, ball.response.block_px)
-    template = template_for(ball.radius_px, blur_px, ball.shades, extent_of(ball).half, ball.streak_px, box_px)
+    template = template_for(ball.radius_px, blur_px, ball.shades, box_px)
     n, places = template.per_px, places_along(ball.streak_px, template.per_px)
     u, v = (round(c * n) for c in centre)
     pixels = patch.bright if bright else patch.colour
-    return _squares_at(pixels, template.fine, n, template.reach, template.radius_px, ball.radius_px, places, u, v)
+    return _squares_at(pixels, template.fine, n, template.radius_px, ball.radius_px, places, u, v)
 
 
 def slopes_at(patch: Patch, ball: Expected, centre: tuple[float, float]) -> Array:
     """Return the slopes (2, n) of a ball's brightness, as fitted, by a given centre from the patch's middle [1/px]."""
-    half, streak_px = extent_of(ball).half, ball.streak_px
-    template = template_for(ball.radius_px, ball.response.luma_px, ball.shades, half, streak_px)
-    n, places = template.per_px, places_along(streak_px, template.per_px)
+    template = template_for(ball.radius_px, ball.response.luma_px, ball.shades)
+    n, places = template.per_px, places_along(ball.streak_px, template.per_px)
     u, v = (round(c * n) for c in centre)
-    drawn = template.fine, n, template.reach, template.radius_px
+    drawn = template.fine, n, template.radius_px
     return _slopes_at(patch.bright, *drawn, ball.radius_px, places, u, v)

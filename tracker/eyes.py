@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-import numpy as np
-
 from tracker.look import Fitted, Look, look_near
 from tracker.rig import Rig
 from tracker.rivals import first_rivals
-from tracker.state import RATE, VELOCITY, State
+from tracker.state import State
 from tracker.types import Frame
+from tracker.view import unknown_streak_px
 
 LEARN_ALL = 72  # balls of each camera; then
 LEARN_EVERY = 4  # rounds one ball
@@ -51,16 +50,7 @@ class Eyes:
 
     def _streak_px(self, state: State) -> float:
         """Return one sigma of how far the balls' images may be smeared that the state does not know of [px]."""
-        marker, P = self._rig.marker, state.P
-        reach_m = float(np.linalg.norm(marker.points_inB - marker.points_inB.mean(axis=0), axis=1).max())
-        speed_m_s = math.sqrt(float(P[VELOCITY, VELOCITY].trace() + reach_m**2 * P[RATE, RATE].trace()) / 3.0)
-        return max(
-            speed_m_s
-            * rivals.best.response.exposure_s
-            * camera.focal_px
-            / float(np.linalg.norm(state.p_BinW - camera.p_CinW))
-            for camera, rivals in zip(self._rig.cameras, self._rivals, strict=True)
-        )
+        return unknown_streak_px(state, self._rig, [rivals.best.response.exposure_s for rivals in self._rivals])
 
     def learn(self, fitted: Sequence[Fitted], *, blindly: bool) -> None:
         """Learn how balls look: from every one at first, then from one in turn every few rounds.

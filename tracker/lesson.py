@@ -9,7 +9,7 @@ import numpy as np
 
 from tracker.centre import Group, misfit_at, slopes_at
 from tracker.compiled import compiled
-from tracker.patch import LUMA, TRUST, Expected, Patch, Response, X, Y, extent_of
+from tracker.patch import LUMA, TRUST, Expected, Patch, Response, X, Y
 from tracker.solve import eliminate
 from tracker.template import BLUR_STEP_PX, GLOSS, TERMS, Vector, every_term, places_along, read, template_for
 from tracker.types import Array
@@ -93,14 +93,12 @@ def light_on(patch: Patch, ball: Expected, centre: tuple[float, float], lamp: Ve
     Returns:
         information (TERMS, TERMS), target (TERMS,) for `Light.learned`; None for a ball without brightness of its own.
     """
-    template = template_for(
-        ball.radius_px, ball.response.luma_px, every_term(lamp), extent_of(ball).half, ball.streak_px
-    )
+    template = template_for(ball.radius_px, ball.response.luma_px, every_term(lamp))
     n, pixels = template.per_px, patch.bright
     value, by_u, by_v = (np.empty((TERMS + 1, pixels.shape[1])) for _ in range(3))
     u, v = (round(c * n) for c in centre)
     places = places_along(ball.streak_px, n)
-    read(template.fine, n, template.reach, template.radius_px, ball.radius_px, u, v, places, pixels, value, by_u, by_v)
+    read(template.fine, n, template.radius_px, ball.radius_px, u, v, places, pixels, value, by_u, by_v)
     terms = value + (centre[0] - u / n) * by_u + (centre[1] - v / n) * by_v
     products = np.empty((OTHERS + TERMS + 1, OTHERS + TERMS + 1))
     _without_others(pixels, terms, slopes_at(patch, ball, centre), products)

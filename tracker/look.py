@@ -13,12 +13,12 @@ from tracker.camera import Camera
 from tracker.centre import Centre
 from tracker.colour_table import colours_of
 from tracker.detect import Blob, find_blobs
-from tracker.measure import predicted_pixels
 from tracker.patch import Expected
 from tracker.rig import Rig
 from tracker.sight import Sight, find_ball
-from tracker.state import ATTITUDE, POSITION, State
+from tracker.state import State
 from tracker.types import BallSighting, Frame, Reason, Rejected, frozen_array
+from tracker.view import DEPTH, RAY_X, RAY_Y, U, V, expected_views
 
 NEAREST_M = 0.3  # a ball closer to a camera than this is not looked for
 
@@ -71,24 +71,15 @@ def look_near(frames: Sequence[Frame], rig: Rig, state: State, appearances: Sequ
 def _balls_of(frame: Frame, rig: Rig, state: State, appearance: Appearance) -> Iterator[tuple[int, Sight | Rejected]]:
     """Yield each ball of the marker as seen near its prediction, or why it is not."""
     camera = rig.cameras[frame.camera]
-    uv_px, H = predicted_pixels(state, rig, frame.camera, frame.t_ns)
-    points_inC = camera.in_camera(rig.marker.points_inB @ state.R_BtoW.T + state.p_BinW)
-    spreads = H @ state.P @ H.transpose(0, 2, 1) + np.eye(2)
-    speeds_px_s = H[:, :, POSITION] @ state.v_BinW + H[:, :, ATTITUDE] @ state.w_BinB
-    for b, ball in enumerate(rig.marker.balls):
-        x, y, depth_m = points_inC[b].tolist()
-        u, v = uv_px[b].tolist()
-        if not (math.isfinite(u) and math.isfinite(v) and depth_m >= NEAREST_M):
+    views = expected_views(state, rig, frame.camera, frame.t_ns).tolist()
+    for b, (ball, view) in enumerate(zip(rig.marker.balls, views, strict=True)):
+        if not (math.isfinite(view[U]) and math.isfinite(view[V]) and view[DEPTH] >= NEAREST_M):
             yield b, Rejected(Reason.BEHIND, f"{ball.name} is not before the camera", frame.t_ns, frame.camera)
             continue
-        (S_uu, S_uv), (_, S_vv) = spreads[b].tolist()
-        speed_u, speed_v = speeds_px_s[b].tolist()
-        found = find_ball(
-            frame.image, colours_of((ball,)), (u, v), (S_uu, S_uv, S_vv), camera.focal_px * ball.radius_m / depth_m,
-            (speed_u, speed_v), appearance.shades(camera, x / depth_m, y / depth_m), appearance.response,
-        )  # fmt: skip
+        shades = appearance.shades(camera, view[RAY_X], view[RAY_Y])
+        found = find_ball(frame.image, colours_of((ball,)), view, shades, appearance.response)
         if isinstance(found, Reason):
-            detail = f"no {ball.name} at ({u:.0f}, {v:.0f}) px, where it is expected"
+            detail = f"no {ball.name} at ({view[U]:.0f}, {view[V]:.0f}) px, where it is expected"
             yield b, Rejected(found, detail, frame.t_ns, frame.camera)
         else:
             yield b, found

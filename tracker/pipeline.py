@@ -50,11 +50,21 @@ Round = tuple[Frame, ...]
 
 @dataclass(slots=True, eq=False)
 class _Harvest:
-    """What the rounds of one step gave so far."""
+    """What the rounds of one step gave so far.
+
+    find_ns, filter_ns: time that looking for balls and updating by them took, since the last estimate [ns].
+    """
 
     sightings: list[BallSighting] = field(default_factory=list)
     rejections: list[Rejected] = field(default_factory=list)
     estimates: list[Estimate] = field(default_factory=list)
+    find_ns: int = 0
+    filter_ns: int = 0
+
+    def stages(self, wait_ns: int, took_ns: int) -> dict[str, int]:
+        """Return what each stage took of a round's time [ns]; what is neither `find` nor `filter` is `track`."""
+        rest_ns = took_ns - self.find_ns - self.filter_ns
+        return {"wait": wait_ns, "find": self.find_ns, "filter": self.filter_ns, "track": rest_ns}
 
 
 class Tracker:
@@ -80,7 +90,8 @@ class Tracker:
         """Take one event of the source and return what came of it."""
         harvest = _Harvest()
         if isinstance(event, Frame) and 0 <= event.camera < len(self._rig.cameras):
-            event = replace(event, t_ns=event.t_ns + self._rig.cameras[event.camera].clock_offset_ns)
+            offset_ns = self._rig.cameras[event.camera].clock_offset_ns
+            event = replace(event, t_ns=event.t_ns + offset_ns) if offset_ns else event
         if isinstance(event, Rejected):
             harvest.rejections.append(event)
         else:
@@ -106,6 +117,7 @@ class Tracker:
     def _take_round(self, frames: Round, harvest: _Harvest) -> None:
         """Follow the track through a round, or look for the marker in it, and say where it is."""
         started_ns = self._stopwatch()
+        harvest.find_ns = harvest.filter_ns = 0
         t_ns = max(frame.t_ns for frame in frames)
         if self._history.forgot(t_ns):
             harvest.rejections += [_late(frame) for frame in frames]
@@ -119,7 +131,7 @@ class Tracker:
         if found is None or found.state.t_ns <= self._sent_ns:
             return
         available_ns = max(frame.available_ns for frame in frames)
-        stages = {"wait": started_ns - available_ns, "track": self._stopwatch() - started_ns}
+        stages = harvest.stages(started_ns - available_ns, self._stopwatch() - started_ns)
         self._sent_ns = found.state.t_ns
         harvest.estimates.append(self._estimate(found, available_ns, stages))
 
@@ -148,10 +160,10 @@ class Tracker:
 
         start: the state is a first guess, which every ball must bear out.
         """
-        found, look = self._glance(frames, ahead, ahead.state, start)
+        found, look = self._glance(frames, ahead, ahead.state, harvest, start=start)
         if isinstance(found, Update) and not start and self._eyes.blind(ahead.state):
             # Only now is known how fast the balls move, and so how their images are smeared: look again.
-            again, sharper = self._glance(frames, ahead, found.state, start)
+            again, sharper = self._glance(frames, ahead, found.state, harvest, start=start)
             found, look = (again, sharper) if isinstance(again, Update) else (found, look)
         harvest.rejections += look.rejections
         if isinstance(found, Rejected):
@@ -163,10 +175,16 @@ class Tracker:
         self._eyes.learn([one for one in look.fitted if one.sighting in found.used], blindly=blindly)
         return found
 
-    def _glance(self, frames: Round, ahead: Prediction, expected: State, start: bool) -> tuple[Update | Rejected, Look]:
+    def _glance(
+        self, frames: Round, ahead: Prediction, expected: State, harvest: _Harvest, *, start: bool
+    ) -> tuple[Update | Rejected, Look]:
         """Look where a state expects the balls, and update the prediction by them."""
+        started_ns = self._stopwatch()
         look = self._eyes.look(frames, expected)
+        looked_ns = self._stopwatch()
         found = self._update(ahead, tuple(one.sighting for one in look.fitted))
+        harvest.find_ns += looked_ns - started_ns
+        harvest.filter_ns += self._stopwatch() - looked_ns
         if isinstance(found, Update) and start and not self._all_seen_twice(found):
             found = Rejected(Reason.GEOMETRY, "not every ball fits in two cameras", ahead.state.t_ns)
         return found, look
@@ -258,7 +276,7 @@ class Tracker:
             w_BinB=frozen_array(state.w_BinB),
             covariance=frozen_array(covariance),
             clock_offsets_s=frozen_array(state.offsets_s),
-            clock_sigmas_s=frozen_array(np.sqrt(np.append(0.0, np.diag(state.P)[OFFSETS:]))),
+            clock_sigmas_s=frozen_array([0.0, *(math.sqrt(v) for v in state.P.diagonal()[OFFSETS:].tolist())]),
             state=self._track,
             reset_counter=self._resets,
             nis=found.nis,

@@ -41,7 +41,7 @@ class Rivals:
     @property
     def best(self) -> Appearance:
         """Return the appearance that fits best."""
-        return self.appearances[int(np.argmin(self.misfits))]
+        return self.appearances[self.misfits.index(min(self.misfits))]
 
     @property
     def lessons_due(self) -> int:

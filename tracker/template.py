@@ -24,11 +24,12 @@ TERMS = 7
 """1, x, y, z, and x, y, z again where the lamp shines."""
 GLOSS = TERMS
 """The term after those: the lamp's mirror image."""
-GLOSS_EXPONENT = 32.0  # about that of satin paint; Blinn, "Models of light reflection", SIGGRAPH 1977
+GLOSS_SQUARINGS = 5  # an exponent of 32, about that of satin paint; Blinn, "Models of light reflection", SIGGRAPH 1977
 MARGIN_PX = 2.5  # patch beyond the ball's edge
 STREAK_MAX_PX = 12.0  # longer motion blur is treated as this long
 RADIUS_STEP_PX = 0.1
 BLUR_STEP_PX = 0.05
+DRAWN = 1024  # templates kept, of about 100 kB each: what a flight through a room shows of all balls, and lessons try
 Vector = tuple[float, float, float]
 Streak = tuple[float, float]
 
@@ -58,25 +59,21 @@ def every_term(lamp: Vector) -> Shades:
 class Template:
     """Shapes on a grid of 1 / per_px pixel.
 
-    fine: (size, size, p), rows are v.  reach: the grid runs from -reach to reach pixels round the centre.
+    fine: (size, size, p), rows are v; the ball's centre is in the middle, the rim and all beyond it empty.
     radius_px: of the ball drawn.
     """
 
     fine: NDArray[np.float32]
     per_px: int
-    reach: int
     radius_px: float
 
 
-def template_for(
-    radius_px: float, blur_px: float, shades: Shades, half: int, streak_px: Streak, box_px: int = 1
-) -> Template:
-    """Return the template of a ball, large enough for patches of 2 half + 1 pixels and the ball's streak.
+def template_for(radius_px: float, blur_px: float, shades: Shades, box_px: int = 1) -> Template:
+    """Return the template of a ball.
 
     blur_px: one sigma of the lens's round kernel.  box_px: side of the square that gathers light: a pixel, or a block.
     """
-    reach = half + 2 + (0 if math.hypot(*streak_px) == 0.0 else round(STREAK_MAX_PX / 2.0))
-    return _draw(round(radius_px / RADIUS_STEP_PX), round(blur_px / BLUR_STEP_PX), box_px, shades, reach)
+    return _draw(round(radius_px / RADIUS_STEP_PX), round(blur_px / BLUR_STEP_PX), box_px, shades)
 
 
 def places_along(streak_px: Streak, per_px: int) -> NDArray[np.int64]:
@@ -95,18 +92,18 @@ def _places(u_steps: int, v_steps: int, per_px: int) -> NDArray[np.int64]:
 
 
 @compiled("f4[:, :, ::1](i8, f8, i8, f8[::1], f8[:, ::1])")
-def _sharp(per_px: int, radius_px: float, border: int, lamp: Array, weights: Array) -> NDArray[np.float32]:
-    """Return the shapes (size, size, p) before lens and pixel, sharp but for the grid's step, with an empty border."""
-    count = int(np.ceil(radius_px * per_px)) + 1 + border
+def _sharp(per_px: int, radius_px: float, count: int, lamp: Array, weights: Array) -> NDArray[np.float32]:
+    """Return the shapes before lens and pixel, sharp but for the grid's step: (size, size, p), size = 2 count + 1."""
     size = 2 * count + 1
     shapes = np.zeros((size, size, len(weights)), dtype=np.float32)
     step = 1.0 / (per_px * radius_px)
     terms = np.empty(TERMS + 1)
     half = lamp + np.array([0.0, 0.0, 1.0])
     half /= max(np.sqrt(half @ half), 1e-3)
-    for row in range(size):
+    rim = min(count, int(np.ceil(radius_px * per_px)) + 1)
+    for row in range(count - rim, count + rim + 1):
         y = (row - count) * step
-        for column in range(size):
+        for column in range(count - rim, count + rim + 1):
             x = (column - count) * step
             distance = np.sqrt(x * x + y * y)
             disc = min((1.0 - distance) / step + 0.5, 1.0)
@@ -119,8 +116,9 @@ def _sharp(per_px: int, radius_px: float, border: int, lamp: Array, weights: Arr
             lit = min(1.0, max(0.0, cosine / step + 0.5))
             for i in range(3):
                 terms[4 + i] = terms[1 + i] * lit
-            mirrored = half[0] * terms[1] + half[1] * terms[2] + half[2] * terms[3]
-            terms[GLOSS] = max(mirrored, 0.0) ** GLOSS_EXPONENT
+            terms[GLOSS] = max(half[0] * terms[1] + half[1] * terms[2] + half[2] * terms[3], 0.0)
+            for _ in range(GLOSS_SQUARINGS):
+                terms[GLOSS] *= terms[GLOSS]
             for k in range(len(weights)):
                 total = 0.0
                 for i in range(TERMS + 1):
@@ -129,12 +127,13 @@ def _sharp(per_px: int, radius_px: float, border: int, lamp: Array, weights: Arr
     return shapes
 
 
-def _kernel(per_px: int, blur_px: float, box_px: int) -> NDArray[np.float32]:
+@lru_cache(maxsize=256)
+def _kernel(per_px: int, blur_steps: int, box_px: int) -> NDArray[np.float32]:
     """Return the lens's and the pixel's blur along one axis of the grid."""
     # A box of n + 1 samples with its ends at half weight is n wide and stays on the grid.
     box = np.ones(box_px * per_px + 1) / (box_px * per_px)
     box[[0, -1]] /= 2.0
-    sigma = blur_px * per_px
+    sigma = blur_steps * BLUR_STEP_PX * per_px
     if sigma < 0.3:
         return box.astype(np.float32)
     count = int(np.ceil(4.0 * sigma))
@@ -142,35 +141,26 @@ def _kernel(per_px: int, blur_px: float, box_px: int) -> NDArray[np.float32]:
     return np.convolve(box, lens / lens.sum()).astype(np.float32)
 
 
-@lru_cache(maxsize=256)
-def _draw(radius_steps: int, blur_steps: int, box_px: int, shades: Shades, reach: int) -> Template:
-    """Draw the shapes of a ball of a rounded radius and blur."""
-    radius_px, blur_px = radius_steps * RADIUS_STEP_PX, blur_steps * BLUR_STEP_PX
+@lru_cache(maxsize=DRAWN)
+def _draw(radius_steps: int, blur_steps: int, box_px: int, shades: Shades) -> Template:
+    """Draw the shapes of a ball of a rounded radius and blur, on a grid just large enough that its rim is empty."""
+    radius_px = radius_steps * RADIUS_STEP_PX
     per_px = 8 if radius_px < 6.0 else 4
-    kernel = _kernel(per_px, blur_px, box_px)
-    weights = np.array(shades.weights)
-    border = len(kernel) // 2 + 1
-    drawn = _sharp(per_px, radius_px, border, np.array(shades.lamp), weights)
+    kernel = _kernel(per_px, blur_steps, box_px)
+    count = math.ceil(radius_px * per_px) + len(kernel) // 2 + 2
+    drawn = _sharp(per_px, radius_px, count, np.array(shades.lamp), np.array(shades.weights))
     blurred = cv2.sepFilter2D(drawn, -1, kernel, kernel, borderType=cv2.BORDER_CONSTANT)
-    blurred = blurred.reshape(*drawn.shape)  # OpenCV drops a single channel's axis
-    fine = np.zeros((2 * reach * per_px + 1, 2 * reach * per_px + 1, len(weights)), dtype=np.float32)
-    off = (len(fine) - len(blurred)) // 2
-    if off >= 0:
-        fine[off : off + len(blurred), off : off + len(blurred)] = blurred
-    else:
-        fine[:] = blurred[-off : -off + len(fine), -off : -off + len(fine)]
+    fine = blurred.astype(np.float32, copy=False).reshape(drawn.shape)  # OpenCV drops a single channel's axis
     fine.flags.writeable = False
-    return Template(fine, per_px, reach, radius_px)
+    return Template(fine, per_px, radius_px)
 
 
 @compiled(
-    "void(Array(float32, 3, 'C', True), i8, i8, f8, f8, i8, i8, i8[:, ::1], f8[:, ::1],"
-    "f8[:, ::1], f8[:, ::1], f8[:, ::1])"
+    "void(Array(float32, 3, 'C', True), i8, f8, f8, i8, i8, i8[:, ::1], f8[:, ::1],f8[:, ::1], f8[:, ::1], f8[:, ::1])"
 )
 def read(
     fine: NDArray[np.float32],
     per_px: int,
-    reach: int,
     drawn_px: float,
     radius_px: float,
     u_steps: int,
@@ -184,7 +174,7 @@ def read(
     """Read a template off for a centre at (u_steps, v_steps) / per_px from a patch's middle, smeared along a streak.
 
     Args:
-        fine, per_px, reach, drawn_px: of the template.
+        fine, per_px, drawn_px: of the template.
         radius_px: the ball's, which drawn_px is rounded from; the rest is put right by the slope of a picture blown
             up about its centre, d/dr = (x d/du + y d/dv) / r, since d/du = -d/dx; the blur grows with it, by a
             percent.
@@ -192,24 +182,23 @@ def read(
         pixels (..., n): the patch, x and y in its first rows.
         value, by_u, by_v (p, n): the shapes, and their slopes by the centre's u and v [1/px], to be filled in.
     """
-    shapes = len(value)
+    shapes, size, middle = len(value), len(fine), len(fine) // 2
     mean = 1.0 / len(places)
     slope = mean * per_px / 2.0
     share = (radius_px - drawn_px) / drawn_px
-    value[:] = 0.0
-    by_u[:] = 0.0
-    by_v[:] = 0.0
-    for k in range(len(places)):
-        top, left = reach * per_px - v_steps - places[k, 1], reach * per_px - u_steps - places[k, 0]
-        for i in range(pixels.shape[1]):
-            r, c = top + int(pixels[1, i] * per_px), left + int(pixels[0, i] * per_px)
-            for p in range(shapes):
-                value[p, i] += fine[r, c, p]
-                by_u[p, i] += fine[r, c - 1, p] - fine[r, c + 1, p]
-                by_v[p, i] += fine[r - 1, c, p] - fine[r + 1, c, p]
-    for p in range(shapes):
-        for i in range(pixels.shape[1]):
-            by_u[p, i] *= slope
-            by_v[p, i] *= slope
-            along_u, along_v = (pixels[0, i] - u_steps / per_px) * share, (pixels[1, i] - v_steps / per_px) * share
-            value[p, i] = value[p, i] * mean + along_u * by_u[p, i] + along_v * by_v[p, i]
+    at_u, at_v = u_steps / per_px, v_steps / per_px
+    flat, along, below = fine.reshape(size * size * shapes), shapes, size * shapes
+    for i in range(pixels.shape[1]):
+        x, y = pixels[0, i], pixels[1, i]
+        column, row = middle - u_steps + int(x * per_px), middle - v_steps + int(y * per_px)
+        for p in range(shapes):
+            here = across = down = 0.0
+            for k in range(len(places)):
+                c, r = column - places[k, 0], row - places[k, 1]
+                if 0 < c < size - 1 and 0 < r < size - 1:
+                    at = r * below + c * along + p
+                    here += flat[at]
+                    across += flat[at - along] - flat[at + along]
+                    down += flat[at - below] - flat[at + below]
+            by_u[p, i], by_v[p, i] = across * slope, down * slope
+            value[p, i] = here * mean + share * ((x - at_u) * by_u[p, i] + (y - at_v) * by_v[p, i])

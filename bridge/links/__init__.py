@@ -34,6 +34,12 @@ class Link(Protocol):
     def receive(self) -> bytes:
         """Return the bytes that came in since the last call."""
 
+    def listen(self, heard: Callable[[bytes], None]) -> None:
+        """Give what comes in from now on to `heard` instead of `receive`, as it comes, from a thread of the link's.
+
+        `heard` may call `send`, which any thread may.
+        """
+
     def state(self) -> LinkState:
         """Return how the link fares."""
 

@@ -28,6 +28,10 @@ class Ledger:
         self._reason = ""
         self._sent = self._dropped = self._superseded = 0
 
+    def now_ns(self) -> int:
+        """Return the stopwatch's reading [ns]."""
+        return self._stopwatch()
+
     def frame(self, message: Message) -> bytes:
         """Return the frame to write now; its sequence number is used up only once `took` is called."""
         return self._encode(message, self._sequence)

@@ -1,4 +1,4 @@
-"""What waits for a slow link: the newest message of each name."""
+"""What waits for a slow link: the newest message of each name and slot."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ class Posted(Enum):
 
 
 class Mailbox:
-    """Hold at most one message of each name; a newer one takes the older one's place in the queue.
+    """Hold at most one message of each name and slot; a newer one takes the older one's place in the queue.
 
     It refuses messages while shut, so that nothing stale waits there when a lost port comes back.
     """
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
-        self._waiting: dict[str, Message] = {}
+        self._waiting: dict[tuple[str, str], Message] = {}
         self._is_open = True
 
     def __len__(self) -> int:
@@ -35,15 +35,16 @@ class Mailbox:
         with self._lock:
             if not self._is_open:
                 return Posted.REFUSED
-            posted = Posted.REPLACED_OLDER if message.name in self._waiting else Posted.NEW
-            self._waiting[message.name] = message
+            place = message.name, message.slot
+            posted = Posted.REPLACED_OLDER if place in self._waiting else Posted.NEW
+            self._waiting[place] = message
             return posted
 
     def take(self) -> Message | None:
-        """Return the message whose name has waited longest, None if there is none."""
+        """Return the message that has waited longest, None if there is none."""
         with self._lock:
-            name = next(iter(self._waiting), None)
-            return None if name is None else self._waiting.pop(name)
+            place = next(iter(self._waiting), None)
+            return None if place is None else self._waiting.pop(place)
 
     def open(self) -> None:
         """Take messages again."""

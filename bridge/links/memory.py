@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Callable
 
 from bridge.links.ledger import Ledger
 from bridge.links.uri import Address
@@ -18,6 +19,7 @@ class MemoryLink:
         self.name = address.uri
         self.frames: deque[bytes] = deque(maxlen=_KEPT_FRAMES)
         self._inbox = bytearray()
+        self._heard: Callable[[bytes], None] | None = None
         self._ledger = ledger
         self._open = True
 
@@ -34,6 +36,12 @@ class MemoryLink:
     def deliver(self, data: bytes) -> None:
         """Let bytes come in."""
         self._inbox += data
+        if self._heard is not None:
+            self._heard(self.receive())
+
+    def listen(self, heard: Callable[[bytes], None]) -> None:
+        """Give what is delivered from now on to `heard` at once."""
+        self._heard = heard
 
     def sent(self) -> list[Sent]:
         """Return what has left since the last call."""

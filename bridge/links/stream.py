@@ -65,6 +65,7 @@ class StreamLink:
         self._retry_s = retry_s
         self._mailbox = Mailbox()
         self._inbox: deque[bytes] = deque(maxlen=_INBOX_CHUNKS)
+        self._heard: Callable[[bytes], None] | None = None
         self._finishing = threading.Event()  # send what waits, then end
         self._quitting = threading.Event()  # end now
         self._closed = False
@@ -93,6 +94,10 @@ class StreamLink:
     def receive(self) -> bytes:
         """Return the bytes that came in since the last call."""
         return b"".join(self._inbox.popleft() for _ in range(len(self._inbox)))
+
+    def listen(self, heard: Callable[[bytes], None]) -> None:
+        """Give what comes in from now on to `heard`, from the link's thread, as it comes."""
+        self._heard = heard
 
     def state(self) -> LinkState:
         """Return how the link fares."""
@@ -187,3 +192,5 @@ class StreamLink:
             os.read(self._wake_read, 4096)
         if port.fileno() in readable:
             self._inbox.append(port.read())
+            if self._heard is not None:
+                self._heard(self.receive())

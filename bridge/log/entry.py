@@ -65,8 +65,8 @@ def estimate_value(estimate: Estimate, q_BtoW: list[float]) -> Value:
         "nis": float(estimate.nis),
         "nis_dof": estimate.nis_dof,
         "available_ns": estimate.available_ns,
-        "clock_offsets_s": estimate.clock_offsets_s.tolist(),
-        "clock_sigmas_s": estimate.clock_sigmas_s.tolist(),
+        "clock_offsets_ms": [1e3 * offset for offset in estimate.clock_offsets_s.tolist()[1:]],
+        "clock_sigmas_ms": [1e3 * sigma for sigma in estimate.clock_sigmas_s.tolist()[1:]],
     }
 
 

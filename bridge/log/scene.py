@@ -1,4 +1,4 @@
-"""The room as viewers draw it: cameras, marker, vehicle pose, in Foxglove's messages."""
+"""The room as viewers draw it: cameras and marker, in Foxglove's messages."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.Log_pb2 import Log
-from foxglove_schemas_protobuf.PoseInFrame_pb2 import PoseInFrame
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
 from bridge.log.topics import BODY, ROOM
@@ -74,23 +73,6 @@ def marker_scene(marker: Marker) -> SceneUpdate:
     return message
 
 
-def vehicle_pose(t_ns: int, p_BinW: list[float], q_BtoW: list[float]) -> PoseInFrame:
-    """Return the body's pose in the room at capture time."""
-    message = PoseInFrame(frame_id=ROOM)
-    stamp(message, t_ns)
-    _set_vector(message.pose.position, p_BinW)
-    _set_quaternion(message.pose.orientation, q_BtoW)
-    return message
-
-
-def vehicle_transform(t_ns: int, p_BinW: list[float], q_BtoW: list[float]) -> FrameTransform:
-    """Return room -> body at capture time."""
-    message = FrameTransform(parent_frame_id=ROOM, child_frame_id=BODY)
-    stamp(message, t_ns)
-    _set_transform(message, p_BinW, q_BtoW)
-    return message
-
-
 def remark(t_ns: int, level: Log.Level.ValueType, name: str, message: str) -> Log:
     """Return a line for the viewer's log panel."""
     line = Log(level=level, name=name, message=message)
@@ -99,13 +81,6 @@ def remark(t_ns: int, level: Log.Level.ValueType, name: str, message: str) -> Lo
 
 
 def _set_transform(message: FrameTransform, translation: list[float], q: list[float]) -> None:
-    _set_vector(message.translation, translation)
-    _set_quaternion(message.rotation, q)
-
-
-def _set_vector(target: Any, values: list[float]) -> None:
-    target.x, target.y, target.z = values
-
-
-def _set_quaternion(target: Any, q: list[float]) -> None:
-    target.w, target.x, target.y, target.z = q
+    at, turn = message.translation, message.rotation
+    at.x, at.y, at.z = translation
+    turn.w, turn.x, turn.y, turn.z = q

@@ -126,8 +126,8 @@ ESTIMATE = json_topic(
     nis=number("normalised innovation squared of the last update"),
     nis_dof=integer("its degrees of freedom, 0 for no update"),
     available_ns=integer("stopwatch reading when the newest frame in it stood in memory [ns]"),
-    clock_offsets_s=numbers("how much later than its stamps each camera was found to see; empty: not estimated [s]"),
-    clock_sigmas_s=numbers("one sigma of them [s]"),
+    clock_offsets_ms=numbers("how much later than its stamp each camera but the first saw, by the first's clock [ms]"),
+    clock_sigmas_ms=numbers("one sigma of each of these [ms]"),
 )
 LATENCY = json_topic(
     "/latency",

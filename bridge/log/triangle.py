@@ -11,12 +11,13 @@ from tracker.types import Array
 SIZE = 12
 LENGTH = SIZE * (SIZE + 1) // 2
 _UPPER = np.triu_indices(SIZE)
+_PLACES = np.ravel_multi_index(_UPPER, (SIZE, SIZE))
 DIAGONAL = tuple(i * SIZE - i * (i - 1) // 2 for i in range(SIZE))
 
 
 def pack(matrix: Array) -> Array:
     """Return the 78 numbers on and above the diagonal of a (12, 12) matrix, row by row."""
-    return matrix[_UPPER]
+    return np.asarray(matrix.take(_PLACES))
 
 
 def unpack(values: Sequence[float | None]) -> Array:

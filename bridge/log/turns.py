@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from bridge.log import topics, triangle
 from bridge.log.reader import LogReader, Record
 from bridge.wire import Sent
-from tracker.types import BallSighting, Estimate, Event, Frame, Reason, Rejected, Step, TrackState, frozen_array
+from tracker.types import Array, BallSighting, Estimate, Event, Frame, Reason, Rejected, Step, TrackState, frozen_array
 
 _NO_IMAGE = np.zeros((0, 0, 3), np.uint8)
 _TOPICS = frozenset(
@@ -109,9 +109,14 @@ def _estimate(value: dict[str, Any], latency: dict[str, Any]) -> Estimate:
         nis_dof=value["nis_dof"],
         available_ns=value["available_ns"],
         stages_ns=MappingProxyType({stage["name"]: stage["duration_ns"] for stage in latency["stages"]}),
-        clock_offsets_s=frozen_array(value.get("clock_offsets_s", ())),
-        clock_sigmas_s=frozen_array(value.get("clock_sigmas_s", ())),
+        clock_offsets_s=_of_all_cameras(value["clock_offsets_ms"]),
+        clock_sigmas_s=_of_all_cameras(value["clock_sigmas_ms"]),
     )
+
+
+def _of_all_cameras(others_ms: list[float]) -> Array:
+    """Return values of all cameras [s] from those of all but the first, which go by its clock [ms]; none from none."""
+    return frozen_array([0.0, *(value_ms / 1e3 for value_ms in others_ms)] if others_ms else [])
 
 
 def _sent(record: Record) -> Sent:

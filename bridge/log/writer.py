@@ -12,7 +12,7 @@ from typing import Any
 from foxglove_schemas_protobuf.Log_pb2 import Log
 
 from bridge.log import entry as values
-from bridge.log import scene, topics
+from bridge.log import scene, topics, vehicle
 from bridge.log.container import Container
 from bridge.log.entry import Entry, encode
 from bridge.wire import Sent
@@ -57,7 +57,9 @@ class Channel:
 
     def put(self, data: bytes, log_ns: int, publish_ns: int) -> None:
         """Append a message; MCAP knows no time before 0, so the file's own stamps stop there."""
-        self._container.add_message(self._id, self._sequence, max(log_ns, 0), max(publish_ns, 0), data)
+        if log_ns < 0 or publish_ns < 0:
+            log_ns, publish_ns = max(log_ns, 0), max(publish_ns, 0)
+        self._container.add_message(self._id, self._sequence, log_ns, publish_ns, data)
         self._sequence += 1
 
 
@@ -132,8 +134,9 @@ class LogWriter:
         value = values.estimate_value(estimate, q_BtoW)
         p_BinW = value["p_BinW_m"]
         self._json(topics.ESTIMATE, value, now_ns, t_ns)
-        self._protobuf(topics.POSE, scene.vehicle_pose(t_ns, p_BinW, q_BtoW), now_ns, t_ns)
-        self._protobuf(topics.VEHICLE_TF, scene.vehicle_transform(t_ns, p_BinW, q_BtoW), now_ns, t_ns)
+        pose, transform = vehicle.pose_and_transform(t_ns, p_BinW, q_BtoW)
+        self._channel(topics.POSE).put(pose, now_ns, t_ns)
+        self._channel(topics.VEHICLE_TF).put(transform, now_ns, t_ns)
         self._json(topics.LATENCY, values.latency_value(estimate, sent), now_ns, t_ns)
         if self._reset_counter is not None and estimate.reset_counter != self._reset_counter:
             message = f"the estimate jumped: reset_counter {self._reset_counter} -> {estimate.reset_counter}"
@@ -164,9 +167,10 @@ class LogWriter:
         self._channel(topic).put(message.SerializeToString(), now_ns, t_ns)
 
     def _channel(self, topic: topics.Topic) -> Channel:
-        if topic.name not in self._channels:
-            self._channels[topic.name] = Channel(self._container, topic)
-        return self._channels[topic.name]
+        channel = self._channels.get(topic.name)
+        if channel is None:
+            channel = self._channels[topic.name] = Channel(self._container, topic)
+        return channel
 
 
 def _calibration(cameras: tuple[Camera, ...], marker: Marker) -> bytes:

@@ -2,10 +2,9 @@
 
 from bridge.settings.choose_rig import ChosenRig, RigOrigin, marker_of, rig_of
 from bridge.settings.load import load_settings, shipped_configs
-from bridge.settings.models import DEFAULT_MESSAGES, LinkSettings, MonitorSettings, Settings, TrackerSettings
+from bridge.settings.models import LinkSettings, MonitorSettings, Settings, TrackerSettings
 
 __all__ = [
-    "DEFAULT_MESSAGES",
     "ChosenRig",
     "LinkSettings",
     "MonitorSettings",

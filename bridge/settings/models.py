@@ -21,8 +21,7 @@ Name = Annotated[str, Field(min_length=1)]
 Triple = Annotated[tuple[Real, ...], Field(min_length=3, max_length=3)]
 Row = Annotated[tuple[Real, ...], Field(min_length=4, max_length=4)]
 
-MessageName = Literal["VISION_POSITION_ESTIMATE", "ATT_POS_MOCAP", "VISION_SPEED_ESTIMATE"]
-DEFAULT_MESSAGES: tuple[MessageName, ...] = ("VISION_POSITION_ESTIMATE", "ATT_POS_MOCAP")
+MessageName = Literal["VISION_POSITION_ESTIMATE", "ATT_POS_MOCAP", "VISION_SPEED_ESTIMATE", "ODOMETRY"]
 COLOUR_KEYS = ("hue_deg", "hue_tolerance_deg", "saturation_min", "value_min", "bgr")
 
 
@@ -138,10 +137,30 @@ class TrackerSettings(Section):
 
 
 class MavlinkSettings(Section):
-    """Who the bridge is on MAVLink."""
+    """Who the bridge is on MAVLink, what kind of autopilot it talks to, and how old a pose may get."""
 
-    system_id: Annotated[int, Strict(), Field(ge=1, le=254)] = 1
+    system_id: Annotated[int, Strict(), Field(ge=1, le=254)] | None = None
     component_id: Annotated[int, Strict(), Field(ge=1, le=255)] = 197
+    profile: Literal["auto", "ardupilot", "px4", "generic"] = "auto"
+    max_age_ms: Positive = 100.0
+
+
+class OriginSettings(Section):
+    """Where the room's origin lies on the globe."""
+
+    latitude_deg: Annotated[float, Strict(), Field(ge=-90, le=90)]
+    longitude_deg: Annotated[float, Strict(), Field(ge=-180, le=180)]
+    altitude_m: Annotated[float, Strict(), Field(ge=-500, le=9000)]
+
+    @model_validator(mode="after")
+    def _is_a_place(self) -> Self:
+        if not self.latitude_deg and not self.longitude_deg:
+            raise ValueError(
+                "latitude_deg and longitude_deg = 0 deg: autopilots refuse that place; give the room's own"
+            )
+        if not self.altitude_m:
+            raise ValueError("altitude_m = 0 m: leaves ArduPilot's height wrong by metres; give the room's own, or 1")
+        return self
 
 
 class MonitorSettings(Section):
@@ -153,14 +172,14 @@ class MonitorSettings(Section):
 
 
 class LinkSettings(Section):
-    """One way to an autopilot, and what goes over it at every estimate."""
+    """One way to an autopilot, and what goes over it at every estimate: the profile's messages unless it names some."""
 
     uri: Name
-    messages: Annotated[tuple[MessageName, ...], Field(min_length=1)] = DEFAULT_MESSAGES
+    messages: Annotated[tuple[MessageName, ...], Field(min_length=1)] | None = None
 
     @model_validator(mode="after")
     def _messages_differ(self) -> Self:
-        refuse_twins("message", self.messages)
+        refuse_twins("message", self.messages or ())
         return self
 
 
@@ -173,6 +192,7 @@ class Settings(Section):
     tracker: TrackerSettings = TrackerSettings()
     mavlink: MavlinkSettings = MavlinkSettings()
     monitor: MonitorSettings = MonitorSettings()
+    origin: OriginSettings | None = None
     links: tuple[LinkSettings, ...] = ()
 
     @model_validator(mode="after")
@@ -181,7 +201,7 @@ class Settings(Section):
         return self
 
     def with_links(self, uris: tuple[str, ...]) -> Settings:
-        """Return these settings with the command line's links, if any, each with the default messages.
+        """Return these settings with the command line's links, if any, each with its profile's messages.
 
         The URIs are checked when the links open, as those of the config are.
         """

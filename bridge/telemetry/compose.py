@@ -170,12 +170,12 @@ def _stage(name: str, times: Histogram) -> page.Stage:
 def _nis(gauges: Gauges) -> page.Nis:
     newest = gauges.newest
     total, dof = gauges.nis()
-    if newest is None:
-        return page.Nis()
+    value = float(newest.nis) if newest is not None and newest.nis_dof else None
+    newest_dof = 0 if newest is None else newest.nis_dof
     if not dof:
-        return page.Nis(float(newest.nis), newest.nis_dof)
+        return page.Nis(value, newest_dof)
     low, high = nis_band(dof)
-    return page.Nis(float(newest.nis), newest.nis_dof, total / dof, low, high)
+    return page.Nis(value, newest_dof, total / dof, low, high)
 
 
 def _camera(gauges: Gauges, window: Sequence[Bin], index: int, frames: int) -> page.CameraView:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 Value = int | float | list[float]
 
-_FORMATS = {"uint64_t": "Q", "uint32_t": "I", "float": "f", "uint8_t": "B"}
+_FORMATS = {"uint64_t": "Q", "uint32_t": "I", "float": "f", "uint8_t": "B", "int8_t": "b", "int64_t": "q"}
 
 
 @dataclass(frozen=True)
@@ -71,6 +71,21 @@ DEFINITIONS = {
         "ATT_POS_MOCAP",
         (Field("uint64_t", "time_usec"), Field("float", "q", 4), *_floats("x", "y", "z")),
         (Field("float", "covariance", 21),),
+    ),
+    111: Definition("TIMESYNC", (Field("int64_t", "tc1"), Field("int64_t", "ts1"))),
+    331: Definition(
+        "ODOMETRY",
+        (
+            Field("uint64_t", "time_usec"),
+            *_floats("x", "y", "z"),
+            Field("float", "q", 4),
+            *_floats("vx", "vy", "vz", "rollspeed", "pitchspeed", "yawspeed"),
+            Field("float", "pose_covariance", 21),
+            Field("float", "velocity_covariance", 21),
+            Field("uint8_t", "frame_id"),
+            Field("uint8_t", "child_frame_id"),
+        ),
+        (Field("uint8_t", "reset_counter"), Field("uint8_t", "estimator_type"), Field("int8_t", "quality")),
     ),
 }
 

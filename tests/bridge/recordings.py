@@ -78,6 +78,8 @@ def turn(k: int, generator: np.random.Generator) -> Turn:
         nis_dof=6,
         available_ns=1_000 + k,
         stages_ns=MappingProxyType({"detect": 400_000, "ekf": 90_000}),
+        clock_offsets_s=frozen_array((0.0, 0.25)),
+        clock_sigmas_s=frozen_array((0.0, 0.5)),
     )
     rejected = Rejected(Reason.NO_BALL, "ball 1 is hidden", t_ns, 0)
     fields: dict[str, FieldValue] = {"usec": t_ns // 1000, "x": 0.5, "covariance": [math.nan, 0.25]}

@@ -95,9 +95,10 @@ def test_a_serial_port_in_use_is_refused(tmp_path: Path) -> None:
     far.vanish()
 
 
-def test_udpin_sends_nothing_until_it_has_heard_somebody_then_to_the_last_heard(tmp_path: Path) -> None:
+def test_udpin_sends_nothing_until_it_has_heard_somebody_then_to_the_first_heard(tmp_path: Path) -> None:
     first = UdpCaller(tmp_path)
-    link = open_link(first.uri, Encoder(Identity(1)), itertools.count().__next__)
+    clock_ns = [0]
+    link = open_link(first.uri, Encoder(Identity(1)), lambda: clock_ns[0])
     link.send(beat(1))
     assert (link.state().up, link.state().reason, link.state().dropped) == (False, "nobody heard yet", 1)
     first.meet(link)
@@ -105,6 +106,9 @@ def test_udpin_sends_nothing_until_it_has_heard_somebody_then_to_the_last_heard(
     assert [frame.sequence for frame in first.frames(1)] == [0]
     first.vanish()
     first.come_back()  # the same host from another port
+    first.write(b"too early")
+    assert link.receive() == b""
+    clock_ns[0] = 2_000_000_000
     first.meet(link)
     link.send(beat(3))
     assert [frame.sequence for frame in first.frames(1)] == [1]

@@ -97,6 +97,7 @@ def test_an_estimate_comes_back_bit_for_bit(whole: Path) -> None:
         upper = np.triu(estimate.covariance)
         np.testing.assert_array_equal(triangle.unpack(value["covariance"]), upper + np.triu(upper, 1).T)
         assert (value["state"], value["reset_counter"]) == ("tracking", estimate.reset_counter)
+        assert (value["clock_offsets_ms"], value["clock_sigmas_ms"]) == ([250.0], [500.0])
         assert (value["nis"], value["nis_dof"], value["available_ns"]) == (estimate.nis, 6, estimate.available_ns)
 
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from bridge.monitor import Monitor
-from bridge.summary import LogSummary
+from bridge.summary import ClockOffset, LogSummary
 from bridge.wire import LinkState, Sent
 from tests.bridge.estimates import estimate, step
-from tracker.types import Frame, Reason, Rejected, Step, TrackState
+from tracker.types import Frame, Reason, Rejected, Step, TrackState, frozen_array
 
 IMAGE = np.zeros((2, 2, 3), np.uint8)
 PERIOD_NS = 66_666_667
@@ -141,3 +141,18 @@ def test_the_summary_passes_links_and_log_on() -> None:
 def test_an_hour_takes_no_more_memory_than_a_minute() -> None:
     one = flown(2000)
     assert len(one._recent) <= 32
+
+
+def test_clocks_are_told_by_camera_and_on_the_status_line_only_when_certain() -> None:
+    watch = Monitor(("cam0", "cam1", "cam2"))
+    offsets, sigmas = frozen_array((0.0, 0.5, 0.125)), frozen_array((0.0, 0.125, 0.25))
+    watch.take(None, step(replace(estimate(), clock_offsets_s=offsets, clock_sigmas_s=sigmas)), ())
+    assert watch.summary((), None).clocks == {"cam1": ClockOffset(500.0, 125.0), "cam2": ClockOffset(125.0, 250.0)}
+    assert watch.reading((), "off").clocks == {"cam1": ClockOffset(500.0, 125.0)}
+
+
+def test_clocks_that_are_not_estimated_are_not_told() -> None:
+    watch = monitor()
+    watch.take(None, step(estimate()), ())
+    assert watch.summary((), None).clocks == {}
+    assert watch.reading((), "off").clocks == {}

@@ -10,10 +10,11 @@ from typing import cast
 import numpy as np
 import pytest
 
+from bridge.dialogue import Terms
 from bridge.links import MemoryLink, open_link
-from bridge.outlet import Outlet, open_outlet
-from bridge.pack import MESSAGES, Encoder, Identity, Packer
-from bridge.wire import Sent
+from bridge.outlet import Outlet, Spout, open_outlet
+from bridge.pack import MESSAGES, Encoder, Identity, Packer, Reader, make_message
+from bridge.wire import Received, Sent
 from tests.bridge.estimates import beat, estimate, random_covariance, step
 from tests.bridge.mavlink_by_hand import ByHand, parse
 from tests.contracts.far_ends import FarEnd, SerialFar, SlowSerialFar, TcpFar, UdpCaller, UdpFar, eventually
@@ -21,14 +22,22 @@ from tracker import so3
 from tracker.errors import OperatorError
 from tracker.types import Step
 
-VISION, MOCAP, SPEED = MESSAGES
+VISION, MOCAP, SPEED, ODOMETRY = MESSAGES
+NO_LIMIT_NS = 10**18
 PERIOD_NS = 33_333_333
 NOTHING = step()
 
 
+def terms(messages: tuple[str, ...]) -> Terms:
+    return Terms(messages=messages, vehicle_id=7, max_age_ns=NO_LIMIT_NS)
+
+
 def outlet_to(links: Sequence[tuple[str, tuple[str, ...]]]) -> Outlet:
     return open_outlet(
-        links, system_id=7, component_id=197, room_yaw_deg=0.0, stopwatch=itertools.count(1000, 10).__next__
+        [(uri, terms(messages)) for uri, messages in links],
+        component_id=197,
+        room_yaw_deg=0.0,
+        stopwatch=itertools.count(1000, 10).__next__,
     )
 
 
@@ -36,7 +45,9 @@ def memory_outlet(*messages: tuple[str, ...]) -> tuple[Outlet, list[MemoryLink]]
     """Return an outlet with a memory link for each selection of messages, and the links."""
     links = [open_link(f"memory:{k}", Encoder(Identity(7)), itertools.count().__next__) for k in range(len(messages))]
     memories = [link for link in links if isinstance(link, MemoryLink)]
-    return Outlet(list(zip(memories, messages, strict=True)), Packer(0.0)), memories
+    return Outlet(
+        [Spout(link, terms(names)) for link, names in zip(memories, messages, strict=True)], Packer(0.0)
+    ), memories
 
 
 def frames(link: MemoryLink) -> list[ByHand]:
@@ -130,7 +141,7 @@ def test_records_tell_what_left_when_and_of_which_frame() -> None:
 def test_a_flight_arrives_whole_at_a_real_far_end(kind: Callable[[Path], FarEnd], tmp_path: Path) -> None:
     far = kind(tmp_path)
     link = open_link(far.uri, Encoder(Identity(7)), itertools.count().__next__)
-    outlet = Outlet([(link, (VISION, MOCAP))], Packer(0.0))
+    outlet = Outlet([Spout(link, terms((VISION, MOCAP)))], Packer(0.0))
     far.meet(link)
     arrived: list[ByHand] = []
     records: list[Sent] = []
@@ -210,12 +221,21 @@ def test_link_states_tell_of_a_peer_that_is_not_there(tmp_path: Path) -> None:
 def test_messages_that_come_in_are_decoded_and_named_by_link(tmp_path: Path) -> None:
     far = UdpCaller(tmp_path)
     outlet = outlet_to([("memory:", ()), (far.uri, ())])
+    outlet.listen(itertools.count(5).__next__)
     raw = Encoder(Identity(1, 1))(beat(42), 9)
     far.write(raw[:5])
-    assert outlet.received() == ()
     far.write(b"")
     far.write(raw[5:] + b"\xfd garbage")
-    ((name, message),) = outlet.received()
+    received: list[tuple[str, Received]] = []
+
+    def arrived() -> bool:
+        outlet.send(NOTHING, 0)
+        received.extend(outlet.received())
+        return bool(received)
+
+    eventually(arrived)
+    ((name, message),) = received
+    assert message.arrived_ns >= 5
     assert (name, message.message, message.system_id, message.component_id) == (far.uri, "HEARTBEAT", 1, 1)
     assert message.fields["custom_mode"] == 42
     outlet.close()
@@ -250,3 +270,38 @@ def test_a_link_that_does_not_open_lets_go_of_those_that_did(tmp_path: Path) -> 
         outlet_to([(far.uri, ()), ("serial:/dev/ttyNone:57600", ())])
     outlet_to([(far.uri, ())]).close()
     far.vanish()
+
+
+@pytest.mark.parametrize("kind", [UdpFar, UdpCaller, SerialFar, TcpFar])
+def test_a_time_request_is_answered_at_once_though_the_loop_stands_still(
+    kind: Callable[[Path], FarEnd], tmp_path: Path
+) -> None:
+    """PX4 believes stamps only after its requests were answered within 10 ms; the loop comes by once a frame."""
+    far = kind(tmp_path)
+    link = open_link(far.uri, Encoder(Identity(7)), itertools.count().__next__)
+    outlet = Outlet([Spout(link, terms((VISION,)))], Packer(0.0))
+    far.meet(link)
+    outlet.send(NOTHING, 0)
+    assert [frame.name for frame in far.frames(1)] == ["HEARTBEAT"]
+    outlet.listen(lambda: 123_456_789)
+    far.write(Encoder(Identity(7, 1))(make_message("TIMESYNC", 0, tc1=0, ts1=42), 0))
+    (answer,) = far.frames(1)
+    assert (answer.name, answer.fields) == ("TIMESYNC", {"tc1": 123_456_789, "ts1": 42})
+    outlet.close()
+    far.vanish()
+
+
+def test_the_bridge_speaks_for_the_vehicle_it_hears() -> None:
+    link = open_link("memory:", encoder := Encoder(Identity(1)), itertools.count().__next__)
+    assert isinstance(link, MemoryLink)
+    outlet = Outlet([Spout(link, Terms(), encoder)], Packer(0.0))
+    outlet.listen(itertools.count(1).__next__)
+    outlet.send(NOTHING, 0)
+    autopilot = make_message("HEARTBEAT", 0, type=4, autopilot=12)
+    link.deliver(Encoder(Identity(42, 1))(autopilot, 0))
+    outlet.send(NOTHING, 10)
+    outlet.send(step(estimate(t_ns=20)), 20)
+    spoken = Reader().feed(b"".join(link.frames))
+    assert (spoken[0].system_id, spoken[0].component_id) == (1, 197)
+    assert spoken[-1].message == ODOMETRY  # a PX4, by its heartbeat
+    assert (spoken[-1].system_id, spoken[-1].component_id) == (42, 197)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import cast
 
 import numpy as np
@@ -13,12 +14,12 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common
 
 from bridge.ned import NedFrame, pose_jacobian, rotation_from_room, turned_triangle
-from bridge.pack import MESSAGES, Encoder, Identity, Packer, heartbeat
+from bridge.pack import MESSAGES, Encoder, Identity, Packer, Reader, heartbeat, make_message
 from tests.bridge.estimates import estimate, random_covariance
 from tests.bridge.mavlink_by_hand import ByHand, parse
 from tracker import so3
 from tracker.errors import OperatorError
-from tracker.types import Array, Estimate
+from tracker.types import Array, Estimate, frozen_array
 
 Floats = Sequence[float]
 DIAGONAL = (0, 6, 11, 15, 18, 20)
@@ -101,7 +102,7 @@ def test_every_field_of_the_pose_messages_is_filled() -> None:
     given_estimate = estimate(
         1_234_567_890_999, (1, 2, 3), so3.exp(np.array([0.1, 0.2, 0.3])), (1, 1, 1), covariance, 9
     )
-    vision, mocap, speed = (sent(name, given_estimate) for name in MESSAGES)
+    vision, mocap, speed = (sent(name, given_estimate) for name in MESSAGES[:3])
     assert vision.fields["usec"] == mocap.fields["time_usec"] == speed.fields["usec"] == 1_234_567_890
     assert vision.fields["reset_counter"] == speed.fields["reset_counter"] == 9
     assert vision.fields["covariance"] == mocap.fields["covariance"]
@@ -143,6 +144,43 @@ def test_velocity_is_sent_north_east_down_with_its_covariance() -> None:
     frame = sent("VISION_SPEED_ESTIMATE", estimate(v_BinW=(1, 2, 3), covariance=covariance), 90.0)
     assert numbers(frame, "x", "y", "z") == pytest.approx((2, 1, -3), abs=1e-6)
     assert vector(frame, "covariance") == pytest.approx([4e-2, 0, 0, 0, 1e-2, -5e-3, 0, -5e-3, 9e-2], abs=1e-8)
+
+
+def test_odometry_speaks_the_one_pair_of_frames_that_both_autopilots_take() -> None:
+    frame = sent("ODOMETRY", estimate(covariance=np.eye(12) * 1e-4))
+    assert (frame.fields["frame_id"], frame.fields["child_frame_id"]) == (20, 12)  # LOCAL_FRD, BODY_FRD
+    assert frame.fields["estimator_type"] == 2  # VISION: PX4 never reads MOCAP's
+    assert frame.fields["quality"] == 90  # one sigma of 10 mm
+    worthless = sent("ODOMETRY", estimate(covariance=np.eye(12)))
+    assert worthless.fields["quality"] == 1  # 0 would say unknown, -1 failed
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.integers(0, 2**32 - 1), st.floats(-180, 180))
+def test_odometrys_twist_is_the_motion_in_the_bodys_own_axes(seed: int, room_yaw_deg: float) -> None:
+    """Its covariance is that of finite differences: velocity and attitude errors both turn into it."""
+    rng = np.random.default_rng(seed)
+    R_BtoW, v_BinW, w_BinB = so3.exp(rng.normal(size=3)), rng.normal(size=3), rng.normal(size=3)
+    covariance = random_covariance(rng, 12)
+    given_estimate = replace(estimate(R_BtoW=R_BtoW, v_BinW=v_BinW, covariance=covariance), w_BinB=frozen_array(w_BinB))
+    odometry = sent("ODOMETRY", given_estimate, room_yaw_deg)
+    vision, speed = (
+        sent(name, given_estimate, room_yaw_deg) for name in ("VISION_POSITION_ESTIMATE", "VISION_SPEED_ESTIMATE")
+    )
+    R_FtoN = so3.from_euler(*numbers(vision, "roll", "pitch", "yaw"))
+    np.testing.assert_allclose(R_FtoN @ numbers(odometry, "vx", "vy", "vz"), numbers(speed, "x", "y", "z"), atol=1e-5)
+    flip = np.array([1.0, -1.0, -1.0])
+    np.testing.assert_allclose(numbers(odometry, "rollspeed", "pitchspeed", "yawspeed"), flip * w_BinB, atol=1e-6)
+    assert vector(odometry, "pose_covariance") == vector(vision, "covariance")
+
+    def twist(error: Array) -> Array:
+        v_BinB = (R_BtoW @ so3.exp(error[3:6])).T @ (v_BinW + error[6:9])
+        return np.concatenate((flip * v_BinB, flip * (w_BinB + error[9:])))
+
+    J = np.array([twist(1e-6 * axis) - twist(-1e-6 * axis) for axis in np.eye(12)]).T / 2e-6
+    np.testing.assert_allclose(
+        unpacked(vector(odometry, "velocity_covariance")), J @ covariance @ J.T, rtol=1e-4, atol=1e-8
+    )
 
 
 angles = st.floats(-math.pi, math.pi)
@@ -250,3 +288,20 @@ def test_an_identity_of_nobody_or_of_the_ground_station_is_refused(system_id: in
 def test_a_heading_that_is_no_number_is_refused() -> None:
     with pytest.raises(OperatorError, match="room_yaw_deg"):
         Packer(math.nan)
+
+
+@pytest.mark.parametrize("name", sorted(dialect_class.msgname for dialect_class in common.mavlink_map.values()))
+def test_every_message_of_the_dialect_can_be_made_with_nothing_in_it(name: str) -> None:
+    (received,) = Reader().feed(Encoder(IDENTITY)(make_message(name, 0), 0))
+    assert received.message == name
+    values = [each for value in received.fields.values() for each in (value if isinstance(value, list) else [value])]
+    assert set(values) <= {0, ""}
+
+
+def test_a_message_is_made_of_its_named_fields_and_no_other_name_is_taken() -> None:
+    made = make_message("PARAM_SET", 0, param_id="VISO_DELAY_MS_AND_MORE", param_value=0.1, target_system=3)
+    (received,) = Reader().feed(Encoder(IDENTITY)(made, 0))
+    assert received.fields["param_id"] == "VISO_DELAY_MS_AN"  # 16 bytes
+    assert received.fields == dict(made.fields)
+    with pytest.raises(KeyError, match="has no field value"):
+        make_message("PARAM_SET", 0, value=1.0)

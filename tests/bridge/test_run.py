@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from bridge.clock import StreamClock
+from bridge.dialogue import Terms
 from bridge.log.reader import LogReader
 from bridge.monitor import Monitor
 from bridge.outlet import Outlet, open_outlet
@@ -44,7 +45,12 @@ class EveryFrame:
 
 
 def outlet() -> Outlet:
-    return open_outlet([("memory:a", (POSE,))], system_id=1, component_id=197, room_yaw_deg=0.0, stopwatch=lambda: 99)
+    return open_outlet(
+        [("memory:a", Terms(messages=(POSE,), max_age_ns=10**12))],
+        component_id=197,
+        room_yaw_deg=0.0,
+        stopwatch=lambda: 99,
+    )
 
 
 def events() -> list[Event]:

@@ -149,7 +149,7 @@ def test_a_source_with_more_cameras_than_the_rig_is_refused() -> None:
 def test_links_of_the_command_line_replace_the_configs() -> None:
     settings = load_settings("lab").with_links(("udpout:10.0.0.2:14550", "serial:/dev/ttyUSB0:921600"))
     assert [link.uri for link in settings.links] == ["udpout:10.0.0.2:14550", "serial:/dev/ttyUSB0:921600"]
-    assert {link.messages for link in settings.links} == {("VISION_POSITION_ESTIMATE", "ATT_POS_MOCAP")}
+    assert {link.messages for link in settings.links} == {None}  # the profile's
 
 
 def test_a_config_may_ask_for_every_message_that_can_be_packed_and_no_other() -> None:
@@ -187,7 +187,7 @@ def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
             "coast_limit_ms = -5.0",
             "[tracker] coast_limit_ms = -5.0 ms: must be greater than 0 ms; correct it",
         ),
-        ("system_id = 1", "system_id = 255", "[mavlink] system_id = 255: must be at most 254; correct it"),
+        ("# system_id = 1", "system_id = 255", "[mavlink] system_id = 255: must be at most 254; correct it"),
         (
             "acceleration_m_s2 = 10.0",
             "acceleration_m_s2 = nan",
@@ -206,7 +206,13 @@ def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
         ("bgr = [24, 186, 198]", "bgr = [24, 186, 300]", "[[marker.balls]] yellow: bgr = 300: must be at most 255"),
         ("width_px = 640", "width_px = 640.5", "[[rig.cameras]] cam0: width_px = 640.5 px: must be a"),
         ('method = "ekf"', 'method = "ukf"', "[tracker] method = 'ukf': must be 'ekf' or 'paper'; correct it"),
-        ('"ATT_POS_MOCAP"]', '"ODOMETRY"]', "[[links]] udpout:127.0.0.1:14550: messages = 'ODOMETRY': must be 'VISION"),
+        (
+            '# messages = ["VISION_POSITION_ESTIMATE"]',
+            'messages = ["GPS_INPUT"]',
+            "[[links]] udpout:127.0.0.1:14550: messages = 'GPS_INPUT': must be 'VISION",
+        ),
+        ("longitude_deg = 34.8", "longitude_deg = 181.0", "[origin] longitude_deg = 181.0 deg: must be at most 180"),
+        ("altitude_m = 30.0", "altitude_m = 0.0", "[origin] altitude_m = 0 m: leaves ArduPilot's height wrong"),
         ("fx_px = 1194.2562584\n", "", "[[rig.cameras]] cam0: fx_px missing; add it"),
         ("room_yaw_deg = 0.0", "", "[room] room_yaw_deg missing; add it"),
         ('name = "cam1"', 'name = "cam0"', "[rig] camera name cam0 comes twice; each must differ"),
@@ -241,7 +247,7 @@ def test_a_mistake_is_told_with_section_key_value_limit_and_remedy(
 
 
 def test_several_mistakes_are_counted(write: Write) -> None:
-    text = edited("system_id = 1", "system_id = 0").replace("component_id = 197", "component_id = 0")
+    text = edited("# system_id = 1", "system_id = 0").replace("component_id = 197", "component_id = 0")
     assert refusal(write(text)).endswith("[mavlink] system_id = 0: must be at least 1; correct it (and 1 more)")
 
 

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 
 import pytest
 from rich.console import Console
 
 from bridge.status import Reading, StatusLine
+from bridge.summary import ClockOffset
 
 FRAME_NS = 66_666_667
 FLYING = Reading("tracking", 15.0, 3.14, 8.0, (0.1, -0.2, 1.0), 1.24, 1, 2, "ok")
@@ -64,6 +66,14 @@ def test_readings_are_taken_only_when_they_are_shown(terminal: bool) -> None:
         for _ in range(100):
             line.show(0, screen.read)
     assert screen.reads == 0
+
+
+def test_a_clock_that_is_certainly_off_is_told() -> None:
+    screen = Screen(terminal=False)
+    off = replace(FLYING, clocks={"cam1": ClockOffset(12.34, 0.4)})
+    for t_ns in (0, 5_000_000_000):
+        screen.line.show(t_ns, lambda: off)
+    assert "| NIS 1.2 | clock cam1 +12.34 +- 0.40 ms | links 1/2 |" in screen.text
 
 
 def test_what_is_not_known_yet_is_a_dash() -> None:

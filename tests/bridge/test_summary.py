@@ -9,7 +9,7 @@ import math
 import pytest
 from rich.console import Console
 
-from bridge.summary import LogSummary, Percentiles, Summary, to_json, to_text
+from bridge.summary import ClockOffset, LogSummary, Percentiles, Summary, to_json, to_text
 from bridge.wire import LinkState
 
 RUN = Summary(
@@ -22,6 +22,7 @@ RUN = Summary(
     rejected={"gate": 3, "late": 1},
     lost=1,
     resets=2,
+    clocks={"cam1": ClockOffset(-3.21, 0.25)},
     links=(LinkState("udpout:127.0.0.1:14550", False, "refused", 600, 4, 0),),
     log=LogSummary("flight.mcap", 1200, 0, "disk full"),
 )
@@ -42,6 +43,7 @@ def test_json_holds_every_figure_under_its_name() -> None:
     assert figures["rejected"] == {"gate": 3, "late": 1}
     assert figures["frames"] == {"cam0": 301, "cam1": 300}
     assert figures["links"][0]["dropped"] == 4
+    assert figures["clocks"] == {"cam1": {"offset_ms": -3.21, "sigma_ms": 0.25}}
     assert figures["log"] == {"path": "flight.mcap", "written": 1200, "dropped": 0, "error": "disk full"}
 
 
@@ -63,6 +65,7 @@ def test_text_shows_what_went_wrong_beside_what_went_well() -> None:
         "300 sent at 15.0 Hz, worst gap 66.7 ms, track lost 1 times, 2 resets",
         "frame to datagram  3.10  5.00  7.70  12.00",
         "rejected    gate 3, late 1",
+        "clocks      cam1 -3.21 +- 0.25 ms against the first camera's",
         "udpout:127.0.0.1:14550: down, refused, 600 sent, 4 dropped",
         "flight.mcap: 1200 records, 0 dropped, ended early: disk full",
     ):

@@ -101,9 +101,12 @@ def test_only_one_module_imports_pymavlink() -> None:
     assert users == {"bridge/pack.py"}
 
 
-def test_only_the_links_and_the_simulated_autopilot_open_sockets_and_ports() -> None:
+def test_only_links_telemetry_and_the_far_ends_of_simulations_open_sockets_and_ports() -> None:
     users = {module.path for module in _modules(*ROOMS) if DEVICES & set(map(_top, module.imports()))}
-    strangers = {path for path in users if not path.startswith("bridge/links/")} - {"tools/simulate/autopilot.py"}
+    far_ends = ("tools/simulate/autopilot/port.py", "tools/sitl/")
+    strangers = {
+        path for path in users if not path.startswith(("bridge/links/", "bridge/telemetry/post.py", *far_ends))
+    }
     assert users
     assert not strangers
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from bridge.links import open_link
 from bridge.pack import Encoder, Identity, Packer, heartbeat
+from tools.simulate.autopilot.navigation import Origin
 from tools.simulate.helicopter import Helicopter
 from tools.simulate.mission import Mission
 from tools.simulate.world import Surroundings, World
@@ -16,6 +17,7 @@ from tracker import so3
 from tracker.types import Estimate, TrackState
 
 START_NS = 10**9
+ORIGIN = Origin(473_978_000, 85_456_000, 488_000)
 BOTH = ("VISION_POSITION_ESTIMATE", "ATT_POS_MOCAP")
 
 
@@ -30,7 +32,7 @@ class ClosedLoop:
         messages: tuple[str, ...] = BOTH,
         component_id: int = 197,
     ) -> None:
-        given, helicopter = Surroundings(room_yaw_deg=room_yaw_deg), Helicopter()
+        given, helicopter = Surroundings(room_yaw_deg=room_yaw_deg, origin=ORIGIN), Helicopter()
         self.mission = Mission(duration_s, given.floor_z_m + helicopter.skid_m)
         self.world = World(self.mission, START_NS, given, helicopter, seed)
         self._link = open_link(
@@ -58,9 +60,9 @@ class ClosedLoop:
         if self.poses:
             noisy = R_BtoW @ so3.exp(self._rng.normal(0.0, 0.004, 3))
             p_noisy = p_BinW + self._rng.normal(0.0, 0.001, 3)
-            rest = np.zeros(3)
+            v_BinW = (p_BinW - self.world.pose_at(t_ns - 5_000_000)[0]) / 0.005 + self._rng.normal(0.0, 0.01, 3)
             estimate = Estimate(
-                t_ns, p_noisy, noisy, rest, rest, 1e-6 * np.eye(12), TrackState.TRACKING, self.reset_counter
+                t_ns, p_noisy, noisy, v_BinW, np.zeros(3), 1e-6 * np.eye(12), TrackState.TRACKING, self.reset_counter
             )
             for message in self._packer.messages(estimate, self._messages).values():
                 self._link.send(message)

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from tools.simulate.dynamics import GRAVITY
 from tools.simulate.helicopter import (
-    GRAVITY,
     Helicopter,
     State,
     Sticks,

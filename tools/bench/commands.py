@@ -15,8 +15,9 @@ from bridge.summary import to_text
 from tools.bench.accuracy import Accuracy, Limit, measure_accuracy
 from tools.bench.consistency import Average, measure_consistency
 from tools.bench.memory import measure_memory
+from tools.bench.meter import CpuClocks
 from tools.bench.rooms import measure_rooms
-from tools.bench.speed import CpuClocks, Speed, measure_speed
+from tools.bench.speed import Speed, measure_speed
 from tools.request import Clocks
 
 WIDTH = 140  # of the accuracy table; a narrower terminal wraps it
@@ -72,6 +73,12 @@ def bench_speed(pairs: int, settings: Settings, clocks: Clocks, cpu: CpuClocks, 
         f"{result.pairs_per_cpu_s:.0f} pairs/s of the process's CPU time, {result.pairs_per_s:.0f} by the wall clock"
     )
     console.print(_stages_table(result))
+    slow = result.slow
+    causes = ", ".join(f"{count} by {cause}" for cause, count in slow.causes.items())
+    console.print(
+        f"{slow.over_limit} pairs over {slow.limit_ms:g} ms; the {slow.worst} slowest were held up: {causes}",
+        soft_wrap=True,
+    )
     console.print(
         f"log thread {result.log_thread_ms:.3f} ms of CPU time and {result.log_bytes:.0f} bytes a pair, on average\n"
     )
@@ -156,12 +163,13 @@ def _stages_table(result: Speed) -> Table:
     """Lay out where the time of a pair goes."""
     table = Table(box=None, pad_edge=False, padding=(0, 2, 0, 0))
     table.add_column("a pair (ms)")
-    for column in ("p50", "p95", "p99", "max"):
+    for column in ("p50", "p95", "p99", "max", "share"):
         table.add_column(column, justify="right")
-    rows = {"whole pair": result.pair_ms, "acquisition": result.acquire_ms, **result.stages_ms}
+    rows = {"acquisition": result.acquire_ms, "whole pair": result.pair_ms, **result.stages_ms}
     for name, spread in rows.items():
         figures = (spread.p50, spread.p95, spread.p99, spread.max)
-        table.add_row(name, *("-" if figure is None else f"{figure:.3f}" for figure in figures))
+        share = f"{result.shares[name]:.1%}" if name in result.shares else ""
+        table.add_row(name, *("-" if figure is None else f"{figure:.3f}" for figure in figures), share)
     return table
 
 

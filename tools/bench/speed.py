@@ -3,41 +3,33 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import chain, islice
 from pathlib import Path
 
-from bridge.clock import Nanoseconds, StreamClock
+from bridge.clock import StreamClock
+from bridge.dialogue import Terms
 from bridge.histogram import Histogram
 from bridge.links import open_link
 from bridge.monitor import Monitor
-from bridge.outlet import Outlet
+from bridge.outlet import DEFAULT_SYSTEM_ID, Outlet, Spout
 from bridge.pack import MESSAGES, Encoder, Identity, Packer
 from bridge.run import Outlets, close, run
 from bridge.settings import Settings
 from bridge.summary import Percentiles, Summary
 from tools.bench.footage import Footage
+from tools.bench.meter import CpuClocks, Meter
 from tools.bench.one_core import one_core
-from tools.bench.stages import Stages, TimedLink, TimedMonitor, TimedPacker
+from tools.bench.pairs import Slow, shares_of, slow_of, spread, stages_of
+from tools.bench.stages import Stages, TimedLink, TimedMonitor, TimedPacker, TimedRecorder, TimedTracker
 from tools.request import Clocks
 from tools.session import recorder_of, tracker_of
-from tracker.intake import Intake
-from tracker.rounds import Rounds
-from tracker.types import Event, Frame, Silence, TrackState
+from tools.steady import steady
+from tracker.types import Frame, Silence, TrackState
 
 WARM_UP = 300  # instants: templates drawn, light learned
 LONG_AGO_NS = 3_600_000_000_000
 FRAMES_KEPT = 90  # instants
-SYNC_WINDOW_NS = 2_000_000  # the figures do not depend on it
-
-
-@dataclass(frozen=True, slots=True)
-class CpuClocks:
-    """Reads the CPU time of the whole process, and of the calling thread [ns]."""
-
-    process: Nanoseconds
-    thread: Nanoseconds
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +40,10 @@ class Speed:
     pairs_per_s: by the wall clock; pairs_per_cpu_s: by the CPU time of the whole process, the log's thread included.
     pair_ms: from a pair's first frame to the end of the loop's work on both.
     acquire_ms: one stereo pair, whole frames searched.
-    stages_ms: of a pair or an estimate; the tracker's own, then those around it.
+    stages_ms: the parts of a pair, the longest first: the tracker's own stages, `intake` (all else in the tracker),
+        pack, link, monitor, record (handing over to the log's thread), loop (what is left).
+    shares: of each in the time of all pairs; they add up to 1.
+    slow: the pairs that took long, and why.
     log_thread_ms: mean CPU time of the threads other than the loop's, which is the log's, a pair.
     log_bytes: a pair, on the disk.
     run: the loop's own figures.
@@ -61,69 +56,55 @@ class Speed:
     pair_ms: Percentiles
     acquire_ms: Percentiles
     stages_ms: dict[str, Percentiles]
+    shares: dict[str, float]
+    slow: Slow
     log_thread_ms: float
     log_bytes: float
     run: Summary
 
 
-def measure_speed(settings: Settings, clocks: Clocks, cpu: CpuClocks, pairs: int) -> Speed:
+def measure_speed(settings: Settings, clocks: Clocks, cpu: CpuClocks, pairs: int, warm_up: int = WARM_UP) -> Speed:
     """Track a simulated flight from memory, log and all, then search it from nothing again and again."""
     footage = Footage(settings, clocks, "figure8", FRAMES_KEPT)
     with one_core() as pinned, tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "bench.mcap"
-        stages, turns = Stages(clocks.stopwatch), Histogram()
-        tracker, played = tracker_of(settings, footage.rig, clocks), footage.play(WARM_UP + pairs)
+        stages, meter = Stages(clocks.stopwatch), Meter(clocks.stopwatch, cpu)
+        tracker, played = tracker_of(settings, footage.rig, clocks), footage.play(warm_up + pairs)
         names = tuple(camera.name for camera in footage.rig.cameras)
-        run(chain(*islice(played, WARM_UP)), tracker, StreamClock(), Outlets(Outlet([], Packer(0.0)), Monitor(names)))
+        run(chain(*islice(played, warm_up)), tracker, StreamClock(), Outlets(Outlet([], Packer(0.0)), Monitor(names)))
         packer = TimedPacker(settings.room.room_yaw_deg, stages)
-        identity = Identity(settings.mavlink.system_id, settings.mavlink.component_id)
+        identity = Identity(DEFAULT_SYSTEM_ID, settings.mavlink.component_id)
         link = TimedLink(open_link("memory:", Encoder(identity), clocks.stopwatch), stages)
         recorder = recorder_of(log, settings, footage.rig, {"source": "bench"}, clocks, block_when_full=True)
-        outlets = Outlets(Outlet([(link, MESSAGES)], packer), TimedMonitor(names, stages), recorder)
-        clock = StreamClock()
-        started = clocks.stopwatch(), cpu.process(), cpu.thread()
-        try:
-            run(_timed(played, stages, turns, clocks.stopwatch), tracker, clock, outlets)
-        finally:
-            close(clock, outlets)
-        wall_ns, process_ns, thread_ns = (
-            now - then for now, then in zip((clocks.stopwatch(), cpu.process(), cpu.thread()), started, strict=True)
+        outlets = Outlets(
+            Outlet([Spout(link, Terms(messages=MESSAGES))], packer),
+            TimedMonitor(names, stages),
+            TimedRecorder(recorder, stages),
         )
+        clock, timed = StreamClock(), TimedTracker(tracker, stages, clocks.stopwatch)
+        with steady(), meter.watch_garbage():
+            started = clocks.stopwatch(), cpu.process(), cpu.thread()
+            try:
+                run(meter.events(played, stages), timed, clock, outlets)
+            finally:
+                close(clock, outlets)
+            wall_ns, process_ns, thread_ns = (
+                now - then for now, then in zip((clocks.stopwatch(), cpu.process(), cpu.thread()), started, strict=True)
+            )
         return Speed(
             pairs,
             pinned,
             pairs * 1e9 / wall_ns,
             pairs * 1e9 / process_ns,
-            turns.percentiles(),
+            spread([pair.wall for pair in meter.pairs]),
             _acquisition(settings, clocks, footage),
-            _front(footage, clocks.stopwatch) | stages.percentiles(),
+            stages_of(meter.pairs),
+            shares_of(meter.pairs),
+            slow_of(meter.pairs),
             (process_ns - thread_ns) / pairs / 1e6,
             log.stat().st_size / pairs,
             outlets.summary(str(log)),
         )
-
-
-def _timed(
-    played: Iterator[tuple[Frame, ...]], stages: Stages, turns: Histogram, stopwatch: Nanoseconds
-) -> Iterator[Event]:
-    """Yield every frame, and time each pair until the loop asks for the next one."""
-    for pair in played:
-        started_ns = stopwatch()
-        yield from pair
-        turns.add(stopwatch() - started_ns)
-        stages.end_pair()
-
-
-def _front(footage: Footage, stopwatch: Nanoseconds) -> dict[str, Percentiles]:
-    """Time intake and rounds, which stand inside the tracker, by themselves on the same frames."""
-    stages = Stages(stopwatch)
-    intake, rounds = Intake(footage.rig), Rounds(len(footage.rig.cameras), SYNC_WINDOW_NS)
-    for pair in footage.play(4 * len(footage.pairs)):
-        for frame in pair:
-            stages.time("intake", intake.refuse, frame)
-            stages.time("rounds", rounds.take, frame)
-        stages.end_pair()
-    return stages.percentiles()
 
 
 def _acquisition(settings: Settings, clocks: Clocks, footage: Footage) -> Percentiles:

@@ -6,16 +6,17 @@ from collections.abc import Callable, Iterable
 from typing import ParamSpec, TypeVar
 
 from bridge.clock import Nanoseconds
-from bridge.histogram import Histogram
 from bridge.links import Link
 from bridge.monitor import Monitor
 from bridge.pack import Packer
-from bridge.summary import Percentiles
+from bridge.recorder import RecorderState
+from bridge.run import Records, Steps
 from bridge.wire import LinkState, Message, Sent
 from tracker.types import Estimate, Event, Step
 
 P = ParamSpec("P")
 R = TypeVar("R")
+WAIT = "wait"  # of the tracker's stages the one that is no work
 
 
 class Stages:
@@ -24,24 +25,48 @@ class Stages:
     def __init__(self, stopwatch: Nanoseconds) -> None:
         self._stopwatch = stopwatch
         self._running: dict[str, int] = {}
-        self._histograms: dict[str, Histogram] = {}
 
     def time(self, stage: str, call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
         """Call and add the time it took to the stage's."""
         started_ns = self._stopwatch()
         result = call(*args, **kwargs)
-        self._running[stage] = self._running.get(stage, 0) + self._stopwatch() - started_ns
+        self.add(stage, self._stopwatch() - started_ns)
         return result
 
-    def end_pair(self) -> None:
-        """Count what the stages came to since the last pair."""
-        for stage, took_ns in self._running.items():
-            self._histograms.setdefault(stage, Histogram()).add(took_ns)
-        self._running.clear()
+    def add(self, stage: str, took_ns: int) -> None:
+        """Add a time that was taken elsewhere."""
+        self._running[stage] = self._running.get(stage, 0) + took_ns
 
-    def percentiles(self) -> dict[str, Percentiles]:
-        """Return each stage's spread over the pairs [ms]."""
-        return {stage: histogram.percentiles() for stage, histogram in self._histograms.items()}
+    def end_pair(self) -> dict[str, int]:
+        """Return what each stage came to since the last pair [ns]."""
+        ended, self._running = self._running, {}
+        return ended
+
+
+class TimedTracker:
+    """Times the tracker: its own stages as its estimates give them, all else it does as `intake`."""
+
+    def __init__(self, tracker: Steps, stages: Stages, stopwatch: Nanoseconds) -> None:
+        self._tracker = tracker
+        self._timed = stages
+        self._stopwatch = stopwatch
+
+    def step(self, event: Event) -> Step:
+        """Take one event."""
+        started_ns = self._stopwatch()
+        step = self._tracker.step(event)
+        rest_ns = self._stopwatch() - started_ns
+        for estimate in step.estimates:
+            for stage, took_ns in estimate.stages_ns.items():
+                if stage != WAIT:
+                    self._timed.add(stage, took_ns)
+                    rest_ns -= took_ns
+        self._timed.add("intake", rest_ns)
+        return step
+
+    def finish(self) -> Step:
+        """Give what was still held back."""
+        return self._tracker.finish()
 
 
 class TimedPacker(Packer):
@@ -76,6 +101,10 @@ class TimedLink:
         """Return the bytes that came in since the last call."""
         return self._link.receive()
 
+    def listen(self, heard: Callable[[bytes], None]) -> None:
+        """Give what comes in to `heard`."""
+        self._link.listen(heard)
+
     def state(self) -> LinkState:
         """Return how the link fares."""
         return self._link.state()
@@ -95,3 +124,23 @@ class TimedMonitor(Monitor):
     def take(self, event: Event | None, step: Step, sent: tuple[Sent, ...]) -> None:
         """Count one turn."""
         self._timed.time("monitor", super().take, event, step, sent)
+
+
+class TimedRecorder:
+    """Times handing the steps to the log's thread, as `record`."""
+
+    def __init__(self, recorder: Records, stages: Stages) -> None:
+        self._recorder = recorder
+        self._timed = stages
+
+    def take(self, event: Event | None, step: Step, sent: tuple[Sent, ...], now_ns: int) -> None:
+        """Hand over one turn."""
+        self._timed.time("record", self._recorder.take, event, step, sent, now_ns)
+
+    def state(self) -> RecorderState:
+        """Say how the recording stands."""
+        return self._recorder.state()
+
+    def close(self) -> None:
+        """End the recording."""
+        self._recorder.close()

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tools.simulate.autopilot.navigation import NavState
+from tools.simulate.dynamics import GRAVITY
 from tools.simulate.mission import Reference
-from tools.simulate.navigation import GRAVITY, NavState
 from tracker.types import Array
 
 

@@ -3,24 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from bridge.ned import rotation_from_room
-from tools.simulate.autopilot import Autopilot, Mode
+from tools.simulate.autopilot.imu import Imu, ImuNoise
+from tools.simulate.autopilot.navigation import Origin
+from tools.simulate.autopilot.parameters import FOR_VISION
+from tools.simulate.autopilot.vessel import Autopilot, Mode
 from tools.simulate.control import PilotSticks
+from tools.simulate.course import Course
 from tools.simulate.helicopter import Helicopter, State, Sticks, standing, step
 from tools.simulate.mission import Mission, Phase
 from tools.simulate.wind import Wind
-from tracker import so3
 from tracker.sources.paths import Pose
 from tracker.types import Array
 
 STEP_NS = 2_500_000
 TICK_STEPS = 8
-_MEMORY_STEPS = 800
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,7 +31,8 @@ class Surroundings:
     floor_z_m: the floor in W: the volume of 1.5 m height has the room's origin in its middle.
     room_yaw_deg: heading of the room's x axis, as the bridge is told it [deg].
     gust_m_s, gust_memory_s: light draught, one sigma, and how long a gust lasts.
-    delay_ns: from mid-exposure until the frame is with the tracker; the autopilot is told it as its vision delay.
+    delay_ns: from mid-exposure until the frame is with the tracker; the autopilot is told it as its VISO_DELAY_MS.
+    origin: what a ground station tells the autopilot of where it is; None leaves that to the bridge.
     """
 
     floor_z_m: float = -0.75
@@ -38,6 +40,7 @@ class Surroundings:
     gust_m_s: float = 0.05
     gust_memory_s: float = 1.0
     delay_ns: int = 30_000_000
+    origin: Origin | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,8 +73,9 @@ class World:
     history: list[Moment] = field(default_factory=list, init=False)
     autopilot: Autopilot = field(init=False)
     _wind: Wind = field(init=False)
+    _imu: Imu = field(init=False)
     _sticks: Sticks = field(default_factory=Sticks, init=False)
-    _states: deque[tuple[int, State]] = field(default_factory=lambda: deque(maxlen=_MEMORY_STEPS), init=False)
+    _course: Course = field(init=False)
     _steps: int = field(default=0, init=False)
 
     def __post_init__(self) -> None:
@@ -79,26 +83,22 @@ class World:
         given = self.surroundings
         room_yaw = math.radians(given.room_yaw_deg)
         R_WtoN = rotation_from_room(room_yaw)
-        self.autopilot = Autopilot(lambda t_s: self.mission.reference_at(t_s).turned(R_WtoN, room_yaw), given.delay_ns)
+        self.autopilot = Autopilot(
+            lambda t_s: self.mission.reference_at(t_s).turned(R_WtoN, room_yaw),
+            {**FOR_VISION, "VISO_DELAY_MS": round(given.delay_ns / 1e6)},
+            origin=given.origin,
+        )
+        self._imu = Imu(ImuNoise(), np.random.default_rng((self.seed, 2)))
         self._wind = Wind(given.gust_m_s, given.gust_memory_s, STEP_NS / 1e9, np.random.default_rng((self.seed, 1)))
         place = self.mission.ground_inW
-        self._states.append(
-            (self.start_ns, standing(self.helicopter, given.floor_z_m, (float(place[0]), float(place[1]))))
-        )
+        start = standing(self.helicopter, given.floor_z_m, (float(place[0]), float(place[1])))
+        self._course = Course(self.start_ns, start, STEP_NS)
 
     def pose_at(self, t_ns: int) -> Pose:
         """Return the true pose at t_ns [ns], simulating on to it; before the start it stands."""
-        while self._states[-1][0] < t_ns:
+        while self._course.now_ns < t_ns:
             self._advance()
-        back = min((self._states[-1][0] - t_ns) // STEP_NS, len(self._states) - 1)
-        later_ns, later = self._states[-1 - back]
-        if back + 1 >= len(self._states) or t_ns >= later_ns:
-            return later.p_BinW, later.R_BtoW
-        _, earlier = self._states[-2 - back]
-        share = 1.0 - (later_ns - t_ns) / STEP_NS
-        turn = so3.log(earlier.R_BtoW.T @ later.R_BtoW)
-        p_BinW = earlier.p_BinW + share * (later.p_BinW - earlier.p_BinW)
-        return p_BinW, earlier.R_BtoW @ so3.exp(share * turn)
+        return self._course.pose_at(t_ns)
 
     def close(self) -> None:
         """Let go of the autopilot's port."""
@@ -106,16 +106,14 @@ class World:
 
     def _advance(self) -> None:
         """Move on by one step of the physics."""
-        now_ns, state = self._states[-1]
+        now_ns, state = self._course.now_ns, self._course.back(0)
         if self._steps % TICK_STEPS == 0:
-            self._sticks = _wired(self.autopilot.tick(now_ns))
+            increment = self._imu.read(self._course.back(TICK_STEPS), state, TICK_STEPS * STEP_NS / 1e9)
+            self._sticks = wired(self.autopilot.tick(now_ns, increment))
             self._note(now_ns, state)
-        wind = self._wind.blow()
-        floor_z_m = self.surroundings.floor_z_m
         self._steps += 1
-        self._states.append(
-            (now_ns + STEP_NS, step(self.helicopter, state, self._sticks, wind, floor_z_m, STEP_NS / 1e9))
-        )
+        floor_z_m = self.surroundings.floor_z_m
+        self._course.add(step(self.helicopter, state, self._sticks, self._wind.blow(), floor_z_m, STEP_NS / 1e9))
 
     def _note(self, now_ns: int, state: State) -> None:
         pilot = self.autopilot
@@ -123,6 +121,6 @@ class World:
         self.history.append(Moment(now_ns, wanted.phase, pilot.mode, state.p_BinW, state.R_BtoW, wanted.p, wanted.yaw))
 
 
-def _wired(pilot: PilotSticks) -> Sticks:
+def wired(pilot: PilotSticks) -> Sticks:
     """Wire a pilot's sticks to the servos: the body's y is left and its z is up, so two of them turn about."""
     return Sticks(pilot.right, -pilot.nose_up, -pilot.nose_right, pilot.up, pilot.motor)

@@ -1,0 +1,194 @@
+"""The talk with the autopilot at the end of one link.
+
+what comes in -> is it the autopilot? -> time, origin
+each turn     -> heartbeat, questions, and which estimates may go
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from bridge.dialogue.announce import Announcer, Severity
+from bridge.dialogue.origin import Origin, OriginKeeper, OriginState
+from bridge.dialogue.peer import Peer, PeerWatch
+from bridge.dialogue.profile import AUTO, Profile, kept_apart, profile_for
+from bridge.dialogue.timesync import TIMESYNC, SyncState, TimeSync
+from bridge.pack import heartbeat
+from bridge.wire import Message, Received
+from tracker.types import Estimate, TrackState
+
+HEARTBEAT_PERIOD_NS = 1_000_000_000
+STALE_NS = 3_000_000_000  # without a word of the autopilot for this long, it is away
+
+
+@dataclass(frozen=True, slots=True)
+class Terms:
+    """What the config says of the talk.
+
+    profile: a profile's name, or auto.  messages: names that replace the profile's; None for the profile's own.
+    vehicle_id: the vehicle's system id, None for the first autopilot heard.  origin: to be told, None for none.
+    max_age_ns: an estimate older than this is not sent [ns].
+    """
+
+    profile: str = AUTO
+    messages: tuple[str, ...] | None = None
+    vehicle_id: int | None = None
+    origin: Origin | None = None
+    max_age_ns: int = 100_000_000
+
+
+@dataclass(frozen=True, slots=True)
+class DialogueState:
+    """What is known of the far end, for people and the log.
+
+    peer: the autopilot, None while none was heard.  away: whether it has fallen silent.  profile: what it is sent.
+    sync: its clock, None while unknown.  origin: how far the matter of its origin has come, "" where it needs none.
+    holding: why no poses are sent at present, "" when they are.
+    too_old, too_close: estimates not sent for their age, or because they followed the last one too closely.
+    strangers: messages of others than the autopilot.
+    """
+
+    peer: Peer | None
+    away: bool
+    profile: str
+    sync: SyncState | None
+    origin: str
+    holding: str
+    too_old: int
+    too_close: int
+    strangers: int
+
+    @property
+    def brief(self) -> str:
+        """The far end in a word or two: the autopilot, whether it is silent, why it gets no poses."""
+        who = "" if self.peer is None else str(self.peer.autopilot) + (" SILENT" if self.away else "")
+        return ", ".join(word for word in (who, f"NO POSES, {self.holding}" if self.holding else "") if word)
+
+    def __str__(self) -> str:
+        """The far end in a line."""
+        return ", ".join(self._words())
+
+    def _words(self) -> Iterator[str]:
+        if self.peer is None:
+            yield "no autopilot heard"
+        else:
+            yield f"{self.peer.autopilot}, system {self.peer.system_id}" + (", SILENT" if self.away else "")
+            yield f"profile {self.profile}"
+        if self.origin:
+            yield f"origin {self.origin}"
+        if self.sync is not None:
+            settled = "" if self.sync.converged else ", settling"
+            yield f"clock {self.sync.offset_ns / 1e6:+.1f} +- {self.sync.spread_ms:.1f} ms{settled}"
+            yield f"round trip {self.sync.rtt_ms:.1f} ms"
+        counts = ((self.too_old, "too old"), (self.too_close, "too close"), (self.strangers, "messages of others"))
+        yield from (f"{count} {what}" for count, what in counts if count)
+
+
+class Dialogue:
+    """One link's talk. It sends nothing itself: it says what is due."""
+
+    def __init__(self, terms: Terms) -> None:
+        self._terms = terms
+        self._watch = PeerWatch(terms.vehicle_id)
+        self._sync = TimeSync()
+        self._origin = OriginKeeper(terms.origin)
+        self._announcer = Announcer()
+        self._heard_ns: int | None = None
+        self._beat_due_ns: int | None = None
+        self._last_pose_ns: int | None = None
+        self._too_old = self._too_close = 0
+
+    @property
+    def peer(self) -> Peer | None:
+        """The autopilot, once it was heard."""
+        return self._watch.peer
+
+    @property
+    def profile(self) -> Profile:
+        """What the autopilot is sent at present."""
+        return profile_for(self._terms.profile, None if self.peer is None else self.peer.autopilot)
+
+    @property
+    def messages(self) -> tuple[str, ...]:
+        """The messages an estimate goes out as."""
+        chosen = self.profile.messages if self._terms.messages is None else self._terms.messages
+        return chosen if self.peer is None else kept_apart(chosen, self.peer.autopilot)
+
+    def take(self, heard: Sequence[Received]) -> None:
+        """Take what came in, in its order."""
+        for message in heard:
+            if not self._watch.takes(message):
+                continue
+            self._heard_ns = message.arrived_ns
+            self._origin.take(message)
+            if message.message == TIMESYNC and message.whole("tc1") != 0:
+                self._sync.take(message)
+                if self._sync.rebooted:
+                    self._origin.start_anew()
+
+    def due(self, track: TrackState, now_ns: int) -> list[Message]:
+        """Return the messages besides poses that are due at stream time now_ns [ns]."""
+        messages = []
+        if self._beat_due_ns is None or now_ns >= self._beat_due_ns:
+            messages.append(heartbeat(now_ns))
+            self._beat_due_ns = _next_beat(self._beat_due_ns, now_ns)
+        if self.peer is None:
+            return messages
+        request = self._sync.request(now_ns)
+        if request is not None:
+            messages.append(request)
+        if self.profile.needs_origin or self._terms.origin is not None:
+            messages += self._origin.due(self.peer, now_ns)
+        return messages + self._announcements(track, now_ns)
+
+    def admits(self, estimate: Estimate, now_ns: int) -> bool:
+        """Say whether an estimate may go out now, and count it if not."""
+        if now_ns - estimate.t_ns > self._terms.max_age_ns:
+            self._too_old += 1
+            return False
+        if self._holding():
+            return False
+        if self._last_pose_ns is not None and 0 <= estimate.t_ns - self._last_pose_ns < self.profile.spacing_ns:
+            self._too_close += 1
+            return False
+        self._last_pose_ns = estimate.t_ns
+        return True
+
+    def state(self, now_ns: int) -> DialogueState:
+        """Return what is known of the far end."""
+        away = self._heard_ns is not None and now_ns - self._heard_ns > STALE_NS
+        origin = str(self._origin.state) if self.profile.needs_origin else ""
+        return DialogueState(
+            self.peer, away, self.profile.name, self._sync.state(), origin, self._holding(), self._too_old,
+            self._too_close, self._watch.strangers,
+        )  # fmt: skip
+
+    def _holding(self) -> str:
+        """Say why poses are held back; an autopilot that can be told its origin is told before the first of them."""
+        waits = self.profile.needs_origin and self._terms.origin is not None and not self._origin.settled
+        return f"origin: {self._origin.state}" if waits else ""
+
+    def _announcements(self, track: TrackState, now_ns: int) -> list[Message]:
+        """Return the news for the pilot."""
+        lost = track is TrackState.LOST
+        other = self._watch.other_autopilot
+        wrong = self._origin.state in (OriginState.LOST, OriginState.MISSING, OriginState.REFUSED)
+        news = (
+            self._announcer.say(
+                "track", f"track {track.value}", Severity.CRITICAL if lost else Severity.NOTICE, now_ns
+            ),
+            self._announcer.say(
+                "stranger", "" if other is None else f"autopilot {other} ignored", Severity.WARNING, now_ns
+            ),
+            self._announcer.say(
+                "origin", f"origin {self._origin.state.name.lower()}" if wrong else "", Severity.WARNING, now_ns
+            ),
+        )
+        return [message for message in news if message is not None]
+
+
+def _next_beat(due_ns: int | None, now_ns: int) -> int:
+    """Return the next heartbeat's time: on the grid of the earlier ones, unless that is past already."""
+    on_grid_ns = (now_ns if due_ns is None else due_ns) + HEARTBEAT_PERIOD_NS
+    return on_grid_ns if on_grid_ns > now_ns else now_ns + HEARTBEAT_PERIOD_NS

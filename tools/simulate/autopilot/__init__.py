@@ -1,0 +1,1 @@
+"""A simulated autopilot that keeps the rules ArduPilot applies to external vision."""
