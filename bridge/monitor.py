@@ -95,7 +95,7 @@ class Monitor:
         far_ends: tuple[DialogueState, ...] = (),
         alarms: tuple[Alarm, ...] = (),
     ) -> Reading:
-        """Return what the status line shows now."""
+        """Return what the status line shows now; alarms: those that stand, what matters most first."""
         spread = self._latency.percentiles()
         newest = self._newest
         shown = newest if self.state is TrackState.TRACKING else None
@@ -110,9 +110,9 @@ class Monitor:
             links=len(links),
             far_ends=tuple(far.brief for far in far_ends if far.brief),
             log=log,
+            clocks={name: offset for name, offset in self._clocks(shown).items() if offset.is_certain},
             alarm=alarms[0].cause if alarms else "",
             alarms=len(alarms),
-            clocks={name: offset for name, offset in self._clocks(shown).items() if offset.is_certain},
         )
 
     def _clocks(self, estimate: Estimate | None) -> dict[str, ClockOffset]:

@@ -31,15 +31,16 @@ STALL_S = 0.5
 class RecorderState:
     """How the recording stands.
 
+    path: the log's, as given.
     written: steps handed to the kernel.  dropped: steps that are not in the log and never will be.
-    size_bytes: of the log.  error: why recording stopped, in one line; None while all is well.  path: as given.
+    size_bytes: of the log.  error: why recording stopped, in one line; None while all is well.
     """
 
+    path: Path
     written: int
     dropped: int
     size_bytes: int
     error: str | None
-    path: str = ""
 
 
 class Recorder:
@@ -105,7 +106,7 @@ class Recorder:
         error = self._error
         if error is None and not self._closed and not self._thread.is_alive():
             error = f"log {self._path}: the recorder's thread is gone, which is a bug; its traceback is on stderr"
-        return RecorderState(self._written, self._refused + self._lost, self._stream.size_bytes, error, str(self._path))
+        return RecorderState(self._path, self._written, self._refused + self._lost, self._stream.size_bytes, error)
 
     def close(self) -> None:
         """Write what is queued, end the file properly and wait for it, at most 10 s. A second call does nothing."""

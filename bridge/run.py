@@ -17,7 +17,7 @@ from bridge.outlet import Outlet
 from bridge.recorder import RecorderState
 from bridge.status import Reading, StatusLine
 from bridge.summary import LogSummary, Summary
-from bridge.telemetry.states import LogState, Surroundings, surroundings_of
+from bridge.telemetry.states import LogState, Surroundings
 from bridge.telemetry.telemetry import Telemetry
 from bridge.wire import Sent
 from tracker.types import Event, Rejected, Step
@@ -66,12 +66,12 @@ class Outlets:
         return f"{state.size_bytes / 1e6:.1f} MB" + (f", {state.dropped} steps dropped" if state.dropped else "")
 
     def surroundings(self) -> Surroundings:
-        """Return how links and log stand."""
+        """Return how links, their far ends and the log stand."""
         log = None
         if self.recorder is not None:
             state = self.recorder.state()
-            log = LogState(state.path, state.size_bytes, state.written, state.dropped, state.error or "")
-        return surroundings_of(self.links.link_states(), self.links.far_ends(), log)
+            log = LogState(str(state.path), state.size_bytes, state.written, state.dropped, state.error or "")
+        return Surroundings(self.links.link_states(), log, self.links.far_ends())
 
     def summary(self, log_path: str | None) -> Summary:
         """Return the run's figures; log_path names the log."""
@@ -126,6 +126,5 @@ def _enter(event: Event | None, step: Step, sent: tuple[Sent, ...], now_ns: int,
 
 
 def _reading(outlets: Outlets) -> Reading:
-    links = outlets.links
     alarms = () if outlets.telemetry is None else outlets.telemetry.alarms()
-    return outlets.monitor.reading(links.link_states(), outlets.log_state(), links.far_ends(), alarms)
+    return outlets.monitor.reading(outlets.links.link_states(), outlets.log_state(), outlets.links.far_ends(), alarms)

@@ -25,10 +25,10 @@ class Reading:
     state: the track's state in a word.  rate_hz: estimates sent a second of stream time [Hz].
     latency_p50_ms, latency_p99_ms: frame available to datagram handed over [ms].
     position_m: x, y, z of the body in the room [m].  nis: of the last update, over its degrees of freedom.
-    alarm, alarms: the alarm that matters most, "" for none, and how many stand.
     clocks: offsets of the cameras' clocks, those that are certainly not zero, by camera name.
     links_up, links: how many links deliver, of how many.  far_ends: the autopilots there, in a word or two each.
     log: the log's state in a word or two.
+    alarm, alarms: the alarm that matters most, "" for none, and how many stand.
     """
 
     state: str
@@ -40,10 +40,10 @@ class Reading:
     links_up: int
     links: int
     log: str
-    alarm: str = ""
-    alarms: int = 0
     far_ends: tuple[str, ...] = ()
     clocks: Mapping[str, ClockOffset] = field(default_factory=lambda: MappingProxyType({}))
+    alarm: str = ""
+    alarms: int = 0
 
 
 class StatusLine:
@@ -98,8 +98,8 @@ def _line(reading: Reading) -> Text:
     clocks = "".join(f"clock {name} {offset} | " for name, offset in reading.clocks.items())
     far_ends = "".join(f" {far_end}" for far_end in reading.far_ends)
     return Text(
-        f"{_alarm(reading)}{reading.state:<9} {reading.rate_hz:5.1f} Hz | "
-        f"latency p50 {_figure(reading.latency_p50_ms)} p99 {_figure(reading.latency_p99_ms)} ms | "
+        f"{_alarm(reading)}{reading.state:<9} {reading.rate_hz:5.1f} Hz | latency p50 "
+        f"{_figure(reading.latency_p50_ms)} p99 {_figure(reading.latency_p99_ms)} ms | "
         f"x y z {position} m | NIS {_figure(reading.nis)} | "
         f"{clocks}links {reading.links_up}/{reading.links}{far_ends} | log {reading.log}",
         overflow="ellipsis",

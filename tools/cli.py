@@ -197,6 +197,23 @@ def export(
 
 
 @app.command()
+def monitor(
+    log: Annotated[
+        Path | None, typer.Argument(help="A log, in place of the bridge that runs.", metavar="[LOG]")
+    ] = None,
+    port: Annotated[
+        int | None, typer.Option(help="The bridge's [monitor] port, where several run or it is not the usual one.")
+    ] = None,
+    once: Annotated[bool, typer.Option("--once", help="Show one page and exit.")] = False,
+    json: JsonOption = False,
+) -> None:
+    """Watch a bridge that runs on this computer, or look through a log: rates, gaps, latency, NIS, links, alarms."""
+    from tools.monitor.command import MonitorRequest, run_monitor
+
+    run_monitor(MonitorRequest(log, port, once, json), _clocks().stopwatch)
+
+
+@app.command()
 def colours(
     config: ConfigOption = "lab",
     source: Annotated[

@@ -135,12 +135,8 @@ def telemetry_of(source: str, settings: Settings, rig: Rig, monitor: Monitor, cl
     """Make the telemetry of a run; without a free port it still watches for alarms, and nobody can attach."""
     post = open_post(settings.monitor.port) if settings.monitor.port else None
     about = About(source, _version("posebridge"), os.getpid(), clocks.monotonic())
-    return Telemetry(about, names_of(rig), limits_of(settings), monitor, post, clocks.stopwatch)
-
-
-def limits_of(settings: Settings) -> Limits:
-    """Return what alarms go by."""
-    return Limits(settings.monitor.rate_min_hz, settings.monitor.latency_limit_ms)
+    limits = Limits(settings.monitor.rate_min_hz, settings.monitor.latency_limit_ms, settings.mavlink.max_age_ms)
+    return Telemetry(about, names_of(rig), limits, monitor, post, clocks.stopwatch)
 
 
 def _recorder(request: RunRequest, opened: OpenedSource, clocks: Clocks) -> Recorder | None:

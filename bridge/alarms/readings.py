@@ -14,10 +14,12 @@ class Limits:
 
     rate_min_hz: fewest poses a second that the autopilot, or the operator, asks for [Hz].
     latency_limit_ms: longest time from frame to datagram for 99 of 100 poses [ms].
+    max_age_ms: an older pose is not sent [ms].
     """
 
     rate_min_hz: float = 15.0
     latency_limit_ms: float = 60.0
+    max_age_ms: float = 100.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +55,7 @@ class Readings:
     t_ns: stream time [ns].  running_s: since the first frame [s].
     state, state_s: the track's, and for how long [s].
     rate_hz: of the last two seconds [Hz].  gap_ms: longest of the last ten, the one going on included [ms].
-    age_ms: how old the oldest pose of the last two was when it left [ms].
+    age_ms: how old the oldest pose of the last two was when it could leave [ms].
     latency_p99_ms: of the newest datagrams [ms].  nis_ratio: mean NIS over its degrees of freedom, of the last ten
         seconds.  None for what is not known.
     last_rejection: what was left out last and why, "" for nothing.

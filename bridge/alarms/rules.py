@@ -10,18 +10,19 @@ from dataclasses import dataclass
 from enum import Enum, StrEnum
 
 from bridge.alarms.readings import Readings
+from bridge.dialogue import DialogueState
 from tracker.types import TrackState
 
 SETTLE_S = 3.0
 RATE_SLACK = 0.97  # frames at exactly the wanted rate jitter about it
 RATE_BACK = 0.985
 GAP_MS, GAP_SEVERE_MS = 100.0, 300.0
-AGE_MS = 250.0  # the longest delay that ArduPilot can be told of
 NIS_HIGH, NIS_LOW = 2.0, 0.4
 SILENT_MS = 500.0
 UNSEEN_S = 3.0
 BLIND_S = 5.0
 SOUGHT_S = 5.0
+HEARD_S = 10.0
 OFFSET_MS, OFFSET_SIGMAS, OFFSET_KNOWN_MS = 3.0, 4.0, 1.5
 SYNC_S = 15.0
 
@@ -139,11 +140,12 @@ def _latency(now: Readings) -> Iterator[Finding]:
 
 
 def _age(now: Readings) -> Iterator[Finding]:
+    limit_ms = now.limits.max_age_ms
     yield Finding(
         "",
-        _above(now.age_ms, AGE_MS, 0.8 * AGE_MS),
-        f"poses leave {now.age_ms or 0:.0f} ms after their frames' stamps, limit {AGE_MS:.0f} ms",
-        "this computer falls behind its cameras: lower their frame rate or use a faster one",
+        _above(now.age_ms, limit_ms, 0.8 * limit_ms),
+        f"poses are {now.age_ms or 0:.0f} ms old when they could leave, limit {limit_ms:g} ms: those are not sent",
+        "this computer falls behind its cameras: lower their frame rate, or check their latency_ms",
     )
 
 
@@ -236,13 +238,49 @@ def _log_dropping(now: Readings) -> Iterator[Finding]:
         )
 
 
-def _time_sync(now: Readings) -> Iterator[Finding]:
-    for sync in now.around.time_syncs:
+def _far_ends(now: Readings) -> Iterator[tuple[str, DialogueState]]:
+    """Yield each link's URI and what is known of its far end."""
+    for link, far in zip(now.around.links, now.around.far_ends, strict=False):
+        yield link.name, far
+
+
+def _autopilot_silent(now: Readings) -> Iterator[Finding]:
+    for link, far in _far_ends(now):
         yield Finding(
-            sync.link,
-            _when(not sync.converged and now.running_s > SYNC_S),
-            f"time sync on {sync.link} has not settled ({sync.samples} samples): PX4 then uses arrival times",
-            "check that the link is two-way and its round trip under 10 ms",
+            link,
+            _when(far.away),
+            f"the autopilot on {link} has fallen silent",
+            "check its power and the wire back from it; it is taken back by itself",
+        )
+
+
+def _poses_held(now: Readings) -> Iterator[Finding]:
+    for link, far in _far_ends(now):
+        yield Finding(
+            link,
+            _when(bool(far.holding)),
+            f"no poses go to {link}: {far.holding}",
+            "wait for its EKF; if it stays so, see the origin in docs/autopilots.md",
+        )
+
+
+def _autopilot_unheard(now: Readings) -> Iterator[Finding]:
+    for link, far in _far_ends(now):
+        yield Finding(
+            link,
+            _when(far.peer is None and now.running_s > HEARD_S),
+            f"no autopilot heard on {link} in {now.running_s:.0f} s: poses go out, nobody says that they arrive",
+            "connect both wires; give the port MAVLink 2 (ArduPilot: SERIALn_PROTOCOL 2) and the right baud",
+        )
+
+
+def _time_sync(now: Readings) -> Iterator[Finding]:
+    for link, far in _far_ends(now):
+        yield Finding(
+            link,
+            _when(far.peer is not None and not far.away and far.sync is None and now.running_s > SYNC_S),
+            f"no TIMESYNC reply on {link} was quick enough to use: the autopilot's clock is not known",
+            "check that the round trip is under 10 ms: a faster baud, or fewer other streams on this port",
         )
 
 
@@ -263,6 +301,9 @@ RULES = (
     Rule("ball_unseen", Level.WARNING, 0.0, 1.0, _ball_unseen),
     Rule("clock_offset", Level.WARNING, 2.0, 2.0, _clock_offset),
     Rule("link_down", Level.ALARM, 0.5, 1.0, _link_down),
+    Rule("autopilot_silent", Level.ALARM, 0.0, 0.0, _autopilot_silent),
+    Rule("poses_held", Level.ALARM, 3.0, 0.0, _poses_held),
+    Rule("autopilot_unheard", Level.WARNING, 0.0, 0.0, _autopilot_unheard),
     Rule("log_stopped", Level.WARNING, 0.0, 0.0, _log_stopped),
     Rule("log_dropping", Level.WARNING, 0.0, 0.0, _log_dropping),
     Rule("time_sync", Level.WARNING, 0.0, 1.0, _time_sync),

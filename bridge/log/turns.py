@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -109,14 +109,14 @@ def _estimate(value: dict[str, Any], latency: dict[str, Any]) -> Estimate:
         nis_dof=value["nis_dof"],
         available_ns=value["available_ns"],
         stages_ns=MappingProxyType({stage["name"]: stage["duration_ns"] for stage in latency["stages"]}),
-        clock_offsets_s=_of_all_cameras(value["clock_offsets_ms"]),
-        clock_sigmas_s=_of_all_cameras(value["clock_sigmas_ms"]),
+        clock_offsets_s=_with_first(value.get("clock_offsets_ms", ())),
+        clock_sigmas_s=_with_first(value.get("clock_sigmas_ms", ())),
     )
 
 
-def _of_all_cameras(others_ms: list[float]) -> Array:
-    """Return values of all cameras [s] from those of all but the first, which go by its clock [ms]; none from none."""
-    return frozen_array([0.0, *(value_ms / 1e3 for value_ms in others_ms)] if others_ms else [])
+def _with_first(values_ms: Sequence[float]) -> Array:
+    """Return what the log says of every camera but the first in seconds, the first one's zero before it."""
+    return frozen_array([0.0, *(value / 1e3 for value in values_ms)] if values_ms else ())
 
 
 def _sent(record: Record) -> Sent:

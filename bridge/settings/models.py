@@ -145,6 +145,14 @@ class MavlinkSettings(Section):
     max_age_ms: Positive = 100.0
 
 
+class MonitorSettings(Section):
+    """Where a running bridge can be watched, and what its alarms go by."""
+
+    port: Annotated[int, Strict(), Field(ge=0, le=65_528)] = 14_730
+    rate_min_hz: Positive = 15.0
+    latency_limit_ms: Positive = 60.0
+
+
 class OriginSettings(Section):
     """Where the room's origin lies on the globe."""
 
@@ -161,14 +169,6 @@ class OriginSettings(Section):
         if not self.altitude_m:
             raise ValueError("altitude_m = 0 m: leaves ArduPilot's height wrong by metres; give the room's own, or 1")
         return self
-
-
-class MonitorSettings(Section):
-    """Where a running bridge can be watched, and what its alarms go by."""
-
-    port: Annotated[int, Strict(), Field(ge=0, le=65_528)] = 14_730
-    rate_min_hz: Positive = 15.0
-    latency_limit_ms: Positive = 60.0
 
 
 class LinkSettings(Section):
@@ -191,8 +191,8 @@ class Settings(Section):
     marker: MarkerSettings
     tracker: TrackerSettings = TrackerSettings()
     mavlink: MavlinkSettings = MavlinkSettings()
-    monitor: MonitorSettings = MonitorSettings()
     origin: OriginSettings | None = None
+    monitor: MonitorSettings = MonitorSettings()
     links: tuple[LinkSettings, ...] = ()
 
     @model_validator(mode="after")

@@ -1,1 +1,1 @@
-"""The state of a running bridge, for whoever watches: bounded in memory, sent over loopback, never waited for."""
+"""A running bridge's state for whoever watches: gathered in bounded memory, sent over loopback, never waited for."""

@@ -100,11 +100,12 @@ def snapshot_of(
         ),
         rejected=dict(summary.rejected),
         links=tuple(replace(link, name=_short(link.name), reason=_short(link.reason)) for link in around.links[:MANY]),
-        log=None if around.log is None else replace(around.log, path=_short(around.log.path)),
-        time_syncs=tuple(replace(sync, link=_short(sync.link)) for sync in around.time_syncs[:MANY]),
-        peers=tuple(replace(peer, link=_short(peer.link), name=_short(peer.name)) for peer in around.peers[:MANY]),
+        log=None
+        if around.log is None
+        else replace(around.log, path=_short(around.log.path), error=_short(around.log.error)),
+        far_ends=around.far_ends[:MANY],
         history=_history(gauges.bins.last(KEPT)),
-        alarms=tuple(replace(alarm, cause=_short(alarm.cause), remedy=_short(alarm.remedy)) for alarm in alarms[:MANY]),
+        alarms=tuple(_short_alarm(alarm) for alarm in alarms[:MANY]),
     )
 
 
@@ -170,12 +171,12 @@ def _stage(name: str, times: Histogram) -> page.Stage:
 def _nis(gauges: Gauges) -> page.Nis:
     newest = gauges.newest
     total, dof = gauges.nis()
-    value = float(newest.nis) if newest is not None and newest.nis_dof else None
-    newest_dof = 0 if newest is None else newest.nis_dof
+    if newest is None:
+        return page.Nis()
     if not dof:
-        return page.Nis(value, newest_dof)
+        return page.Nis(float(newest.nis), newest.nis_dof)
     low, high = nis_band(dof)
-    return page.Nis(value, newest_dof, total / dof, low, high)
+    return page.Nis(float(newest.nis), newest.nis_dof, total / dof, low, high)
 
 
 def _camera(gauges: Gauges, window: Sequence[Bin], index: int, frames: int) -> page.CameraView:
@@ -210,6 +211,10 @@ def _history(bins: Sequence[Bin]) -> page.History:
         latency_ms=tuple(round(each.latency_ns / 1e6, 3) if each.latency_ns else None for each in bins),
         nis_ratio=tuple(each.nis / each.dof if each.dof else None for each in bins),
     )
+
+
+def _short_alarm(alarm: Alarm) -> Alarm:
+    return replace(alarm, subject=_short(alarm.subject), cause=_short(alarm.cause), remedy=_short(alarm.remedy))
 
 
 def _short(text: str) -> str:

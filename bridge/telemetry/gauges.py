@@ -158,9 +158,8 @@ class Gauges:
     def _take_estimate(self, estimate: Estimate) -> None:
         here = self.bins.at(self.now_ns)
         here.poses += 1
-        if estimate.nis_dof:
-            here.nis += estimate.nis
-            here.dof += estimate.nis_dof
+        here.nis += estimate.nis
+        here.dof += estimate.nis_dof
         here.age_ns = max(here.age_ns, self.now_ns - estimate.t_ns)
         if self._came_ns:
             gap_ns = self.now_ns - self._came_ns[-1]

@@ -105,4 +105,5 @@ def _limits(config: Mapping[str, Any]) -> Limits:
     return Limits(
         float(chosen.get("rate_min_hz", usual.rate_min_hz)),
         float(chosen.get("latency_limit_ms", usual.latency_limit_ms)),
+        float(config.get("mavlink", {}).get("max_age_ms", usual.max_age_ms)),
     )

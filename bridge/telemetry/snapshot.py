@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import orjson
 
 from bridge.alarms import Alarm
+from bridge.dialogue import DialogueState
 from bridge.summary import Percentiles
-from bridge.telemetry.states import LogState, PeerState, TimeSyncState
+from bridge.telemetry.states import LogState
 from bridge.wire import LinkState
 
 VERSION = 1
@@ -156,8 +157,7 @@ class Snapshot:
     rejected: dict[str, int]
     links: tuple[LinkState, ...]
     log: LogState | None
-    time_syncs: tuple[TimeSyncState, ...]
-    peers: tuple[PeerState, ...]
+    far_ends: tuple[DialogueState, ...]
     history: History
     alarms: tuple[Alarm, ...]
 

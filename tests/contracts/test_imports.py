@@ -101,7 +101,7 @@ def test_only_one_module_imports_pymavlink() -> None:
     assert users == {"bridge/pack.py"}
 
 
-def test_only_links_telemetry_and_the_far_ends_of_simulations_open_sockets_and_ports() -> None:
+def test_only_the_links_and_the_far_ends_of_simulations_open_sockets_and_ports() -> None:
     users = {module.path for module in _modules(*ROOMS) if DEVICES & set(map(_top, module.imports()))}
     far_ends = ("tools/simulate/autopilot/port.py", "tools/sitl/")
     strangers = {

@@ -1,128 +1,151 @@
-"""Telemetry: what is shown is what happened, and nobody who watches can hold the loop up."""
+"""Telemetry: what a watcher is shown is what the loop did, in bounded size, live or from the log."""
 
 from __future__ import annotations
 
-import socket
+from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
+import orjson
 import pytest
+from scipy.stats import chi2
 
+from bridge.telemetry.bins import KEPT, Bins
+from bridge.telemetry.compose import EDGES_MS, nis_band, quantile
+from bridge.telemetry.gauges import Names
+from bridge.telemetry.logged import LoggedRun
 from bridge.telemetry.parse import from_bytes
-from bridge.telemetry.post import DATAGRAMS_PER_CHECK, HELLO, HOST, LISTENERS, Caller, Post, open_post
-from bridge.telemetry.snapshot import MAX_BYTES, to_bytes
-from tests.bridge.telemetry.turns import Run, quiet
+from bridge.telemetry.snapshot import MAX_BYTES, VERSION, to_bytes
+from bridge.telemetry.states import LogState, Surroundings
+from bridge.wire import LinkState
+from tests.bridge.recordings import PERIOD_NS, START_NS, record, turns
+from tests.bridge.telemetry.watched import UP, Watched
 from tracker.errors import OperatorError
+from tracker.types import TrackState
+
+SECOND_NS = 1_000_000_000
 
 
-@pytest.fixture
-def post() -> Post:
-    sock = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    sock.bind((HOST, 0))
-    return Post(sock)
+def test_a_snapshot_comes_off_the_wire_as_it_went_on() -> None:
+    watched = Watched()
+    watched.fly(*turns(90))
+    snapshot = watched.snapshot()
+    assert from_bytes(to_bytes(snapshot)) == snapshot
 
 
-def test_a_snapshot_shows_what_happened() -> None:
-    shown = Run().fly(100).telemetry.snapshot(quiet)
-    assert shown.rate.poses == 100
-    assert shown.rate.now_hz == pytest.approx(20.0)
-    assert shown.rate.gap_recent_ms == pytest.approx(50.0)
-    assert shown.latency.recent_p99_ms == pytest.approx(4.0)
-    assert [stage.name for stage in shown.latency.stages] == ["send"]
-    assert sum(shown.latency.total.counts) == 100
-    assert sum(shown.history.poses) == 100
+def test_rate_gaps_and_counts_are_those_of_the_turns() -> None:
+    watched = Watched()
+    flight = turns(120)
+    watched.fly(*flight[:90])
+    watched.fly(*((event, step, sent, now_ns + SECOND_NS) for event, step, sent, now_ns in flight[90:]))
+    rate = watched.snapshot().rate
+    assert rate.poses == 120
+    assert rate.gap_ever_ms == pytest.approx(1000.0 + PERIOD_NS / 1e6)
+    assert rate.now_hz == pytest.approx(15.0, rel=1e-3)  # the gap lies within the two seconds, and counts
 
 
-def test_a_snapshot_comes_back_from_its_bytes_as_it_was() -> None:
-    shown = Run().fly(100).telemetry.snapshot(quiet)
-    assert from_bytes(to_bytes(shown)) == shown
+def test_poses_of_the_history_add_up_to_all_of_the_last_two_minutes() -> None:
+    watched = Watched()
+    watched.fly(*turns(1500))
+    assert sum(watched.snapshot().history.poses) == 1500
 
 
-@pytest.mark.parametrize("data", [b"", b"\xff", b"[]", b"{}", b'{"version": 1}', b"hello"])
-def test_what_is_no_snapshot_is_passed_over(data: bytes) -> None:
-    assert from_bytes(data) is None
+def test_the_histogram_holds_every_datagram() -> None:
+    watched = Watched()
+    watched.fly(*turns(700))
+    total = watched.snapshot().latency.total
+    assert sum(total.counts) == total.spread_ms.count == 700
+    place = total.counts.index(700)  # all took exactly 5 ms
+    assert EDGES_MS[place - 1] <= 5.0 <= EDGES_MS[place]
 
 
-def test_a_snapshot_of_another_version_names_both() -> None:
-    with pytest.raises(OperatorError, match="version 7, this monitor 1"):
-        from_bytes(b'{"version": 7}')
+def test_a_log_tells_the_same_as_the_bridge_that_wrote_it(tmp_path: Path) -> None:
+    watched, flight = Watched(), turns(300)
+    watched.fly(*flight)
+    record(tmp_path / "a.mcap", flight)
+    live = watched.snapshot()
+    (logged,) = LoggedRun(tmp_path / "a.mcap").snapshots()
+    assert logged.rate == live.rate
+    assert logged.track == live.track
+    assert logged.latency.total == live.latency.total
+    assert logged.nis.mean_ratio == pytest.approx(live.nis.mean_ratio)
+    assert logged.pose is not None
+    assert live.pose is not None
+    assert logged.pose.position_m == pytest.approx(live.pose.position_m)
+    assert [camera.clock_offset_ms for camera in logged.cameras] == [0.0, 250.0]
 
 
-def test_whoever_says_hello_is_told_and_whoever_falls_silent_is_forgotten(post: Post) -> None:
-    run = Run(post)
-    caller = Caller((post.port,), lambda: run.now_ns)
-    assert caller.listen(0.0) == []
-    run.fly(10)
-    ((port, data),) = caller.listen(1.0)
-    assert port == post.port
-    shown = from_bytes(data)
-    assert shown is not None
-    assert 0 < shown.rate.poses <= 10
-    assert post.anybody(run.now_ns)
-    assert not post.anybody(run.now_ns + 3_000_000_001)
-    caller.close()
-    post.close()
+def test_a_file_without_the_calibration_is_no_log_of_ours(tmp_path: Path) -> None:
+    with pytest.raises(OperatorError, match="no such file"):
+        LoggedRun(tmp_path / "none.mcap")
 
 
-def test_a_listener_that_never_reads_holds_nobody_up_and_costs_no_memory(post: Post) -> None:
-    """Its socket's buffer fills; what does not fit is lost to it alone, and the loop's socket never blocks."""
-    stalled = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    stalled.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
-    stalled.bind((HOST, 0))
-    run = Run(post)
-    for _ in range(40):
-        stalled.sendto(HELLO, (HOST, post.port))
-        run.fly(20)
-    assert post.anybody(run.now_ns)
-    assert run.telemetry.snapshot(quiet).rate.poses == 800
-    stalled.close()
-    post.close()
+def test_a_lost_track_is_said_while_nothing_comes() -> None:
+    watched = Watched()
+    watched.fly(*turns(90))
+    end_ns = START_NS + 90 * PERIOD_NS
+    for k in range(10):
+        watched.wait(end_ns + k * SECOND_NS // 5, TrackState.LOST)
+    assert "track_lost" in watched.names_of_alarms()
+    assert watched.snapshot().rate.now_hz == 0.0
 
 
-def test_a_flood_is_read_a_few_datagrams_a_look_and_its_senders_are_few(post: Post) -> None:
-    callers = [socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(3 * LISTENERS)]
-    for caller in callers:
-        caller.sendto(HELLO, (HOST, post.port))
-    for _ in range(5 * DATAGRAMS_PER_CHECK):
-        callers[0].sendto(b"\x00" * 60_000, (HOST, post.port))
-    run = Run(post)
-    run.fly(2)
-    left = 3 * LISTENERS + 5 * DATAGRAMS_PER_CHECK
-    while post.anybody(run.now_ns) and left > 0:
-        left -= DATAGRAMS_PER_CHECK
-    told = 0
-    run.fly(20)
-    for caller in callers:
-        caller.setblocking(False)
-        told += _has_mail(caller)
-        caller.close()
-    assert told == LISTENERS
-    post.close()
+def test_hostile_names_and_texts_never_outgrow_a_datagram() -> None:
+    long = "\u2603" * 5000
+    names = Names((long,) * 8, (long,) * 8, (0.0,) * 8)
+    links = tuple(replace(UP, name=f"{k}{long}", up=False, reason=long) for k in range(50))
+    watched = Watched(names, Surroundings(links, LogState(long, 1, 1, 1, long)))
+    for k, (event, step, sent, now_ns) in enumerate(turns(4000)):
+        late = tuple(each._replace(sent_ns=SECOND_NS * (1 + k % 7)) for each in sent)
+        watched.fly((event, step, late, now_ns))
+    assert len(to_bytes(watched.snapshot())) <= MAX_BYTES
 
 
-def _has_mail(sock: socket.socket) -> bool:
-    try:
-        return bool(sock.recv(MAX_BYTES))
-    except BlockingIOError:
-        return False
+def test_another_versions_snapshot_is_refused_in_a_line_and_rubbish_is_none() -> None:
+    watched = Watched()
+    watched.fly(*turns(3))
+    value = orjson.loads(to_bytes(watched.snapshot()))
+    with pytest.raises(OperatorError, match=f"version {VERSION + 1}"):
+        from_bytes(orjson.dumps({**value, "version": VERSION + 1}))
+    for rubbish in (
+        b"",
+        b"\xff\xfe",
+        b"[]",
+        b"{}",
+        orjson.dumps({**value, "track": 3}),
+        orjson.dumps({"version": "1"}),
+    ):
+        assert from_bytes(rubbish) is None
 
 
-def test_two_bridges_on_one_computer_take_two_ports() -> None:
-    first = open_post(0)
-    assert first is not None
-    second = open_post(first.port)
-    assert second is not None
-    assert second.port > first.port
-    first.close()
-    second.close()
+@pytest.mark.parametrize("dof", [6, 100, 1800])
+def test_the_nis_band_is_chi_squares(dof: int) -> None:
+    expected = chi2.ppf([0.025, 0.975], dof) / dof
+    np.testing.assert_allclose(nis_band(dof), expected, rtol=1e-9)
 
 
-def test_a_run_that_ends_says_so(post: Post) -> None:
-    run = Run(post)
-    caller = Caller((post.port,), lambda: run.now_ns)
-    caller.listen(0.0)
-    run.fly(10)
-    run.telemetry.close(quiet)
-    run.telemetry.close(quiet)
-    shown = from_bytes(caller.listen(1.0)[-1][1])
-    assert shown is not None
-    assert shown.ended
-    caller.close()
+def test_a_quantile_is_a_value_of_the_list_that_its_share_does_not_exceed() -> None:
+    rising = [float(value) for value in range(1, 101)]
+    assert (quantile(rising, 0.5), quantile(rising, 0.99), quantile([], 0.5)) == (50.0, 99.0, None)
+
+
+def test_seconds_without_anything_are_empty_bins_and_old_ones_go() -> None:
+    bins = Bins(1, 1)
+    bins.at(0).poses = 7
+    bins.at(5 * SECOND_NS).poses = 3
+    assert [each.poses for each in bins.last(KEPT)] == [7, 0, 0, 0, 0, 3]
+    bins.at(10**6 * SECOND_NS)
+    assert [each.second for each in bins.last(KEPT)] == list(range(10**6 - KEPT + 1, 10**6 + 1))
+
+
+def test_a_link_that_goes_down_is_said_after_its_time_and_taken_back() -> None:
+    watched = Watched()
+    down = LinkState("memory:a", False, "no such device", 1, 0, 0)
+    flight = turns(200)
+    watched.fly(*flight[:60])
+    watched.around = Surroundings((down,))
+    watched.fly(*flight[60:120])
+    assert watched.names_of_alarms() == {"link_down", "camera_silent"}  # these turns are all of one camera
+    watched.around = Surroundings((UP,))
+    watched.fly(*flight[120:])
+    assert watched.names_of_alarms() == {"camera_silent"}
