@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from bridge.clock import Nanoseconds
 from bridge.dialogue import Dialogue, DialogueState, Ear, Terms
 from bridge.links import Link, open_link
 from bridge.pack import MESSAGES, Encoder, Identity, Packer
+from bridge.signing import Seal, Signing
 from bridge.wire import LinkState, Received, Sent
 from tracker.errors import OperatorError
 from tracker.types import Step
@@ -23,11 +24,13 @@ class Spout:
     """One link and the talk over it.
 
     terms: of the talk.  encoder: the link's, which takes on the vehicle's system id if the terms name none.
+    signing: of both directions, None for none.
     """
 
     link: Link
     terms: Terms
     encoder: Encoder | None = None
+    signing: Signing | None = None
     dialogue: Dialogue = field(init=False)
     ear: Ear | None = field(default=None, init=False)
 
@@ -45,14 +48,21 @@ class Spout:
                 self.encoder.speak_for(peer.system_id)
         return heard
 
+    def state(self, now_ns: int) -> DialogueState:
+        """Return what is known of the far end at stream time now_ns [ns]."""
+        state = self.dialogue.state(now_ns)
+        return state if self.signing is None else replace(state, unsigned=self.signing.refused)
+
 
 class Outlet:
     """Send each estimate once to every link that may have it, and carry on the talk with each autopilot.
 
     spouts: open links, each with the terms of its talk.  packer: makes messages of estimates.
+    seal: what the links sign with, let go of when they close; None for unsigned ones.
     """
 
-    def __init__(self, spouts: Sequence[Spout], packer: Packer) -> None:
+    def __init__(self, spouts: Sequence[Spout], packer: Packer, seal: Seal | None = None) -> None:
+        self._seal = seal
         self._spouts = tuple(spouts)
         self._packer = packer
         self._received: deque[tuple[str, Received]] = deque(maxlen=_KEPT_MESSAGES)
@@ -62,7 +72,7 @@ class Outlet:
         """Hear from now on what comes in. now: reads stream time [ns], from any thread."""
         for spout in self._spouts:
             if spout.ear is None:
-                spout.ear = Ear(spout.link, now)
+                spout.ear = Ear(spout.link, now, spout.signing)
 
     def send(self, step: Step, now_ns: int) -> tuple[Sent, ...]:
         """Send what is due, and return what has left since the last call.
@@ -95,7 +105,7 @@ class Outlet:
 
     def far_ends(self) -> tuple[DialogueState, ...]:
         """Return what was known of each link's far end at the last `send`, in the links' order."""
-        return tuple(spout.dialogue.state(self._now_ns) for spout in self._spouts)
+        return tuple(spout.state(self._now_ns) for spout in self._spouts)
 
     def link_states(self) -> tuple[LinkState, ...]:
         """Return how each link fares, in the order they were given."""
@@ -105,6 +115,8 @@ class Outlet:
         """Close every link, giving what waits a short time to leave; return what has left since the last `send`."""
         for spout in self._spouts:
             spout.link.close()
+        if self._seal is not None:
+            self._seal.close()
         return self._sent()
 
     def _sent(self) -> tuple[Sent, ...]:
@@ -117,6 +129,7 @@ def open_outlet(
     component_id: int,
     room_yaw_deg: float,
     stopwatch: Nanoseconds,
+    seal: Seal | None = None,
 ) -> Outlet:
     """Open every link and make the outlet of them.
 
@@ -125,6 +138,7 @@ def open_outlet(
         component_id: who speaks, see `bridge.pack.Identity`; the system id is the vehicle's.
         room_yaw_deg: heading of the room's x axis, clockwise from north [deg].
         stopwatch: reads a running time [ns].
+        seal: signs what goes out and is asked of what comes in; the outlet then owns it.  None for neither.
     Raises:
         OperatorError: a URI given twice, a message name not known, an id out of range, or a link that does not open.
     """
@@ -132,15 +146,18 @@ def open_outlet(
     packer = Packer(room_yaw_deg)
     spouts: list[Spout] = []
     try:
-        for uri, terms in links:
+        for number, (uri, terms) in enumerate(links):
             known = DEFAULT_SYSTEM_ID if terms.vehicle_id is None else terms.vehicle_id
-            encoder = Encoder(Identity(known, component_id))
-            spouts.append(Spout(open_link(uri, encoder, stopwatch), terms, encoder))
+            signing = None if seal is None else seal.for_link(number)
+            encoder = Encoder(Identity(known, component_id), signing)
+            spouts.append(Spout(open_link(uri, encoder, stopwatch), terms, encoder, signing))
     except OperatorError:
         for spout in spouts:
             spout.link.close()
+        if seal is not None:
+            seal.close()
         raise
-    return Outlet(spouts, packer)
+    return Outlet(spouts, packer, seal)
 
 
 def _check(links: Sequence[tuple[str, Terms]]) -> None:

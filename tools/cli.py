@@ -214,6 +214,15 @@ def monitor(
 
 
 @app.command()
+def key(file: Annotated[Path, typer.Argument(help="The file to make; none may be there yet.")]) -> None:
+    """Make a secret key for MAVLink 2 signing, for `[mavlink] signing_key` in the config (docs/autopilots.md)."""
+    from bridge.signing import make_key
+
+    make_key(file)
+    typer.echo(f"{file}: 64 hexadecimal digits, mode 600; name it as [mavlink] signing_key in the config", err=True)
+
+
+@app.command()
 def colours(
     config: ConfigOption = "lab",
     source: Annotated[

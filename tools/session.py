@@ -21,6 +21,7 @@ from bridge.run import Outlets, Steps, close, run
 from bridge.settings import Settings
 from bridge.settings.terms import terms_of
 from bridge.settings.tuning import tuning_of
+from bridge.signing import Seal, open_seal
 from bridge.status import StatusLine
 from bridge.summary import Summary, to_text
 from bridge.telemetry.gauges import names_of
@@ -112,7 +113,14 @@ def links_of(settings: Settings, clocks: Clocks) -> Outlet:
         component_id=settings.mavlink.component_id,
         room_yaw_deg=settings.room.room_yaw_deg,
         stopwatch=clocks.stopwatch,
+        seal=seal_of(settings, clocks),
     )
+
+
+def seal_of(settings: Settings, clocks: Clocks) -> Seal | None:
+    """Open the signing key that the config names, if it names one."""
+    key = settings.mavlink.signing_key
+    return open_seal(Path(key), clocks.wall, clocks.stopwatch) if key else None
 
 
 def recorder_of(

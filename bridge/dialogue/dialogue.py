@@ -46,7 +46,7 @@ class DialogueState:
     sync: its clock, None while unknown.  origin: how far the matter of its origin has come, "" where it needs none.
     holding: why no poses are sent at present, "" when they are.
     too_old, too_close: estimates not sent for their age, or because they followed the last one too closely.
-    strangers: messages of others than the autopilot.
+    strangers: messages of others than the autopilot.  unsigned: messages refused for want of a right signature.
     """
 
     peer: Peer | None
@@ -58,6 +58,7 @@ class DialogueState:
     too_old: int
     too_close: int
     strangers: int
+    unsigned: int = 0
 
     @property
     def brief(self) -> str:
@@ -81,7 +82,12 @@ class DialogueState:
             settled = "" if self.sync.converged else ", settling"
             yield f"clock {self.sync.offset_ns / 1e6:+.1f} +- {self.sync.spread_ms:.1f} ms{settled}"
             yield f"round trip {self.sync.rtt_ms:.1f} ms"
-        counts = ((self.too_old, "too old"), (self.too_close, "too close"), (self.strangers, "messages of others"))
+        counts = (
+            (self.too_old, "too old"),
+            (self.too_close, "too close"),
+            (self.strangers, "messages of others"),
+            (self.unsigned, "messages REFUSED, not signed with our key"),
+        )
         yield from (f"{count} {what}" for count, what in counts if count)
 
 

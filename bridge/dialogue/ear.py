@@ -8,6 +8,7 @@ from bridge.clock import Nanoseconds
 from bridge.dialogue.timesync import answer
 from bridge.links import Link
 from bridge.pack import Reader
+from bridge.signing import Signing
 from bridge.wire import Received
 
 _KEPT_MESSAGES = 4096
@@ -21,12 +22,13 @@ class Ear:
 
     Args:
         link: to listen on and answer by.  now: stream time [ns], read from the link's thread.
+        signing: what is not rightly signed is not heard; None to hear everything.
     """
 
-    def __init__(self, link: Link, now: Nanoseconds) -> None:
+    def __init__(self, link: Link, now: Nanoseconds, signing: Signing | None = None) -> None:
         self._link = link
         self._now = now
-        self._reader = Reader()
+        self._reader = Reader(signing)
         self._heard: deque[Received] = deque(maxlen=_KEPT_MESSAGES)
         link.listen(self._hear)
 

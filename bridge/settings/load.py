@@ -21,13 +21,14 @@ def load_settings(name_or_path: str | Path) -> Settings:
     Args:
         name_or_path: the name of a shipped config, such as `lab`; anything else is a path.
     Returns:
-        The settings; `rig.calibration`, if given, made absolute from the config's own folder.
+        The settings; paths in it, if given, made absolute from the config's own folder.
     Raises:
         OperatorError: no such file, no TOML, an unknown key, a value outside its limit.
     """
     path = shipped_configs().get(str(name_or_path), Path(name_or_path))
     table = _read(path)
-    _anchor_calibration(table, path.resolve().parent)
+    _anchor(table, "rig", "calibration", path.resolve().parent)
+    _anchor(table, "mavlink", "signing_key", path.resolve().parent)
     try:
         return Settings.model_validate(table)
     except ValidationError as error:
@@ -54,8 +55,8 @@ def _read(path: Path) -> dict[str, object]:
         ) from error
 
 
-def _anchor_calibration(table: dict[str, object], folder: Path) -> None:
-    """Make a relative calibration path start at the config's folder, so the config can be used from anywhere."""
-    rig = table.get("rig")
-    if isinstance(rig, dict) and isinstance(rig.get("calibration"), str) and rig["calibration"]:
-        rig["calibration"] = str(folder / Path(rig["calibration"]).expanduser())
+def _anchor(table: dict[str, object], section: str, key: str, folder: Path) -> None:
+    """Make a relative path start at the config's folder, so the config can be used from anywhere."""
+    chosen = table.get(section)
+    if isinstance(chosen, dict) and isinstance(chosen.get(key), str) and chosen[key]:
+        chosen[key] = str(folder / Path(chosen[key]).expanduser())

@@ -143,6 +143,7 @@ class MavlinkSettings(Section):
     component_id: Annotated[int, Strict(), Field(ge=1, le=255)] = 197
     profile: Literal["auto", "ardupilot", "px4", "generic"] = "auto"
     max_age_ms: Positive = 100.0
+    signing_key: str = ""
 
 
 class MonitorSettings(Section):
