@@ -88,7 +88,7 @@ class Outlet:
         self._now_ns = now_ns
         for spout in self._spouts:
             self._received.extend((spout.link.name, message) for message in spout.hear())
-            for message in spout.dialogue.due(step.state, now_ns):
+            for message in spout.dialogue.due(step.state, now_ns, spout.link.state().superseded):
                 spout.link.send(message)
         for estimate in step.estimates:
             going = [spout for spout in self._spouts if spout.dialogue.admits(estimate, now_ns)]

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from bridge.dialogue.announce import Announcer, Severity
-from bridge.dialogue.origin import Origin, OriginKeeper, OriginState
+from bridge.dialogue.news import Facts, News, Saturation
+from bridge.dialogue.origin import Origin, OriginKeeper
 from bridge.dialogue.peer import Peer, PeerWatch
 from bridge.dialogue.profile import AUTO, Profile, kept_apart, profile_for
 from bridge.dialogue.timesync import TIMESYNC, SyncState, TimeSync
@@ -99,7 +99,9 @@ class Dialogue:
         self._watch = PeerWatch(terms.vehicle_id)
         self._sync = TimeSync()
         self._origin = OriginKeeper(terms.origin)
-        self._announcer = Announcer()
+        self._news = News()
+        self._saturation = Saturation()
+        self._late = False
         self._heard_ns: int | None = None
         self._beat_due_ns: int | None = None
         self._last_pose_ns: int | None = None
@@ -133,9 +135,13 @@ class Dialogue:
                 if self._sync.rebooted:
                     self._origin.start_anew()
 
-    def due(self, track: TrackState, now_ns: int) -> list[Message]:
-        """Return the messages besides poses that are due at stream time now_ns [ns]."""
+    def due(self, track: TrackState, now_ns: int, superseded: int = 0) -> list[Message]:
+        """Return the messages besides poses that are due at stream time now_ns [ns].
+
+        superseded: how many messages of this link a newer one has replaced so far.
+        """
         messages = []
+        self._saturation.take(superseded, now_ns)
         if self._beat_due_ns is None or now_ns >= self._beat_due_ns:
             messages.append(heartbeat(now_ns))
             self._beat_due_ns = _next_beat(self._beat_due_ns, now_ns)
@@ -146,11 +152,12 @@ class Dialogue:
             messages.append(request)
         if self.profile.needs_origin or self._terms.origin is not None:
             messages += self._origin.due(self.peer, now_ns)
-        return messages + self._announcements(track, now_ns)
+        return messages + self._news.due(self._facts(track, now_ns), now_ns)
 
     def admits(self, estimate: Estimate, now_ns: int) -> bool:
         """Say whether an estimate may go out now, and count it if not."""
-        if now_ns - estimate.t_ns > self._terms.max_age_ns:
+        self._late = now_ns - estimate.t_ns > self._terms.max_age_ns
+        if self._late:
             self._too_old += 1
             return False
         if self._holding():
@@ -163,11 +170,10 @@ class Dialogue:
 
     def state(self, now_ns: int) -> DialogueState:
         """Return what is known of the far end."""
-        away = self._heard_ns is not None and now_ns - self._heard_ns > STALE_NS
         origin = str(self._origin.state) if self.profile.needs_origin else ""
         return DialogueState(
-            self.peer, away, self.profile.name, self._sync.state(), origin, self._holding(), self._too_old,
-            self._too_close, self._watch.strangers,
+            self.peer, self._is_away(now_ns), self.profile.name, self._sync.state(), origin, self._holding(),
+            self._too_old, self._too_close, self._watch.strangers,
         )  # fmt: skip
 
     def _holding(self) -> str:
@@ -175,23 +181,17 @@ class Dialogue:
         waits = self.profile.needs_origin and self._terms.origin is not None and not self._origin.settled
         return f"origin: {self._origin.state}" if waits else ""
 
-    def _announcements(self, track: TrackState, now_ns: int) -> list[Message]:
-        """Return the news for the pilot."""
-        lost = track is TrackState.LOST
-        other = self._watch.other_autopilot
-        wrong = self._origin.state in (OriginState.LOST, OriginState.MISSING, OriginState.REFUSED)
-        news = (
-            self._announcer.say(
-                "track", f"track {track.value}", Severity.CRITICAL if lost else Severity.NOTICE, now_ns
-            ),
-            self._announcer.say(
-                "stranger", "" if other is None else f"autopilot {other} ignored", Severity.WARNING, now_ns
-            ),
-            self._announcer.say(
-                "origin", f"origin {self._origin.state.name.lower()}" if wrong else "", Severity.WARNING, now_ns
-            ),
-        )
-        return [message for message in news if message is not None]
+    def _facts(self, track: TrackState, now_ns: int) -> Facts:
+        """Return what the pilot may have to hear of."""
+        sync = self._sync.state()
+        restarts = 0 if sync is None else sync.restarts
+        return Facts(
+            track, self._late, self._is_away(now_ns), self._saturation.now, restarts, self._watch.other_autopilot,
+            self._origin.state,
+        )  # fmt: skip
+
+    def _is_away(self, now_ns: int) -> bool:
+        return self._heard_ns is not None and now_ns - self._heard_ns > STALE_NS
 
 
 def _next_beat(due_ns: int | None, now_ns: int) -> int:
