@@ -22,6 +22,7 @@ class Facts:
     late: the newest estimate was too old to send.  away: the autopilot has fallen silent.
     saturated: the link does not take all that it is given.  restarts: how often the autopilot's clock has jumped.
     stranger: system id of a second autopilot, None for none.
+    yaw: what the yaw watch has to say in a few words, "" for nothing.
     """
 
     track: TrackState
@@ -31,6 +32,7 @@ class Facts:
     restarts: int
     stranger: int | None
     origin: OriginState
+    yaw: str = ""
 
 
 class Saturation:
@@ -74,6 +76,7 @@ class News:
         yield self._ill_or_well("link", facts.saturated, "link full, rate reduced", "link free again", Severity.WARNING)
         jumped = f"autopilot clock stepped ({facts.restarts})" if facts.restarts else ""
         yield "clock", jumped, Severity.WARNING
+        yield "yaw", facts.yaw, Severity.CRITICAL
         stranger = "" if facts.stranger is None else f"autopilot {facts.stranger} ignored"
         yield "stranger", stranger, Severity.WARNING
         origin = f"origin {facts.origin.name.lower()}" if facts.origin in ORIGIN_TROUBLE else ""
