@@ -13,7 +13,7 @@ from bridge.pack import MESSAGES, Encoder, Identity, Packer
 from bridge.signing import Seal, Signing
 from bridge.wire import LinkState, Message, Received, Sent
 from tracker.errors import OperatorError
-from tracker.types import Step
+from tracker.types import Estimate, Step
 
 _KEPT_MESSAGES = 8192
 DEFAULT_SYSTEM_ID = 1  # until an autopilot was heard, where the config names none
@@ -88,7 +88,7 @@ class Outlet:
         self._now_ns = now_ns
         for spout in self._spouts:
             self._received.extend((spout.link.name, message) for message in spout.hear())
-            for message in spout.dialogue.due(step.state, now_ns):
+            for message in spout.dialogue.due(step.state, now_ns, spout.link.state().superseded):
                 spout.link.send(message)
         for estimate in step.estimates:
             going = [spout for spout in self._spouts if spout.dialogue.admits(estimate, now_ns)]
@@ -97,6 +97,7 @@ class Outlet:
             for spout in going:
                 for name in spout.dialogue.messages:
                     spout.link.send(packed[name])
+            self._watch(estimate, now_ns)
         return self._sent()
 
     def say(self, messages: Iterable[Message]) -> None:
@@ -124,6 +125,12 @@ class Outlet:
         if self._seal is not None:
             self._seal.close()
         return self._sent()
+
+    def _watch(self, estimate: Estimate, now_ns: int) -> None:
+        """Hold an estimate that has gone against the motion of each vehicle that flies."""
+        v_N, yaw = self._packer.motion(estimate)
+        for spout in self._spouts:
+            spout.dialogue.watch(estimate.t_ns, v_N, yaw, now_ns)
 
     def _sent(self) -> tuple[Sent, ...]:
         return tuple(record for spout in self._spouts for record in spout.link.sent())

@@ -12,6 +12,8 @@ from operator import itemgetter
 from types import MappingProxyType
 from typing import NamedTuple
 
+import numpy as np
+
 # The v20 dialect always frames MAVLink 2; mavutil would look at the environment and may cut the extension fields.
 # ArduPilot's dialect holds the common one, and its own EKF_STATUS_REPORT.
 from pymavlink.dialects.v20 import ardupilotmega as dialect
@@ -20,7 +22,7 @@ from bridge.ned import NedFrame, NedPose, NedTwist, NedVelocity
 from bridge.signing.signature import SIGNED, Signing
 from bridge.wire import FieldValue, Message, Received
 from tracker.errors import OperatorError
-from tracker.types import Estimate
+from tracker.types import Array, Estimate
 
 Fields = dict[str, FieldValue]
 HEARTBEAT = "HEARTBEAT"
@@ -175,6 +177,10 @@ class Packer:
                 fields = _VELOCITY_FILL[name](estimate, self._frame.velocity(estimate))
             packed[name] = Message(name, t_ns, available_ns, MappingProxyType(fields))
         return packed
+
+    def motion(self, estimate: Estimate) -> tuple[Array, float]:
+        """Return the velocity (3,), north-east-down [m/s], and the yaw [rad]."""
+        return np.array(self._frame.velocity(estimate).v_BinN), self._frame.pose(estimate).euler[2]
 
 
 def heartbeat(t_ns: int) -> Message:

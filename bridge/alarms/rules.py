@@ -254,6 +254,16 @@ def _autopilot_silent(now: Readings) -> Iterator[Finding]:
         )
 
 
+def _yaw_wrong(now: Readings) -> Iterator[Finding]:
+    for link, far in _far_ends(now):
+        yield Finding(
+            link,
+            _when(bool(far.yaw)),
+            far.yaw,
+            "take over by hand and land; then see marker and room_yaw_deg by `posebridge check --frame`",
+        )
+
+
 def _poses_held(now: Readings) -> Iterator[Finding]:
     for link, far in _far_ends(now):
         yield Finding(
@@ -302,6 +312,7 @@ RULES = (
     Rule("clock_offset", Level.WARNING, 2.0, 2.0, _clock_offset),
     Rule("link_down", Level.ALARM, 0.5, 1.0, _link_down),
     Rule("autopilot_silent", Level.ALARM, 0.0, 0.0, _autopilot_silent),
+    Rule("yaw_wrong", Level.ALARM, 0.0, 2.0, _yaw_wrong),
     Rule("poses_held", Level.ALARM, 3.0, 0.0, _poses_held),
     Rule("autopilot_unheard", Level.WARNING, 0.0, 0.0, _autopilot_unheard),
     Rule("log_stopped", Level.WARNING, 0.0, 0.0, _log_stopped),

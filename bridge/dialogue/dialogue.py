@@ -9,14 +9,15 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from bridge.dialogue.announce import Announcer, Severity
-from bridge.dialogue.origin import Origin, OriginKeeper, OriginState
+from bridge.dialogue.heading import ATTITUDE, HeadingWatch
+from bridge.dialogue.news import Facts, News, Saturation
+from bridge.dialogue.origin import Origin, OriginKeeper
 from bridge.dialogue.peer import Peer, PeerWatch
 from bridge.dialogue.profile import AUTO, Profile, kept_apart, profile_for
 from bridge.dialogue.timesync import TIMESYNC, SyncState, TimeSync
 from bridge.pack import heartbeat
 from bridge.wire import Message, Received
-from tracker.types import Estimate, TrackState
+from tracker.types import Array, Estimate, TrackState
 
 HEARTBEAT_PERIOD_NS = 1_000_000_000
 STALE_NS = 3_000_000_000  # without a word of the autopilot for this long, it is away
@@ -46,6 +47,7 @@ class DialogueState:
     sync: its clock, None while unknown.  origin: how far the matter of its origin has come, "" where it needs none.
     holding: why no poses are sent at present, "" when they are.
     too_old, too_close: estimates not sent for their age, or because they followed the last one too closely.
+    yaw: what is wrong with our yaw against the vehicle's motion, "" for nothing.
     strangers: messages of others than the autopilot.  unsigned: messages refused for want of a right signature.
     """
 
@@ -59,12 +61,14 @@ class DialogueState:
     too_close: int
     strangers: int
     unsigned: int = 0
+    yaw: str = ""
 
     @property
     def brief(self) -> str:
         """The far end in a word or two: the autopilot, whether it is silent, why it gets no poses."""
         who = "" if self.peer is None else str(self.peer.autopilot) + (" SILENT" if self.away else "")
-        return ", ".join(word for word in (who, f"NO POSES, {self.holding}" if self.holding else "") if word)
+        holding = f"NO POSES, {self.holding}" if self.holding else ""
+        return ", ".join(word for word in (who, holding, "YAW WRONG" if self.yaw else "") if word)
 
     def __str__(self) -> str:
         """The far end in a line."""
@@ -78,6 +82,8 @@ class DialogueState:
             yield f"profile {self.profile}"
         if self.origin:
             yield f"origin {self.origin}"
+        if self.yaw:
+            yield f"YAW WRONG: {self.yaw}"
         if self.sync is not None:
             settled = "" if self.sync.converged else ", settling"
             yield f"clock {self.sync.offset_ns / 1e6:+.1f} +- {self.sync.spread_ms:.1f} ms{settled}"
@@ -99,7 +105,10 @@ class Dialogue:
         self._watch = PeerWatch(terms.vehicle_id)
         self._sync = TimeSync()
         self._origin = OriginKeeper(terms.origin)
-        self._announcer = Announcer()
+        self._heading = HeadingWatch()
+        self._news = News()
+        self._saturation = Saturation()
+        self._late = False
         self._heard_ns: int | None = None
         self._beat_due_ns: int | None = None
         self._last_pose_ns: int | None = None
@@ -128,14 +137,20 @@ class Dialogue:
                 continue
             self._heard_ns = message.arrived_ns
             self._origin.take(message)
+            if message.message == ATTITUDE:
+                self._heading.take(message)
             if message.message == TIMESYNC and message.whole("tc1") != 0:
                 self._sync.take(message)
                 if self._sync.rebooted:
                     self._origin.start_anew()
 
-    def due(self, track: TrackState, now_ns: int) -> list[Message]:
-        """Return the messages besides poses that are due at stream time now_ns [ns]."""
+    def due(self, track: TrackState, now_ns: int, superseded: int = 0) -> list[Message]:
+        """Return the messages besides poses that are due at stream time now_ns [ns].
+
+        superseded: how many messages of this link a newer one has replaced so far.
+        """
         messages = []
+        self._saturation.take(superseded, now_ns)
         if self._beat_due_ns is None or now_ns >= self._beat_due_ns:
             messages.append(heartbeat(now_ns))
             self._beat_due_ns = _next_beat(self._beat_due_ns, now_ns)
@@ -146,11 +161,15 @@ class Dialogue:
             messages.append(request)
         if self.profile.needs_origin or self._terms.origin is not None:
             messages += self._origin.due(self.peer, now_ns)
-        return messages + self._announcements(track, now_ns)
+        attitude = self._heading.due(self.peer, now_ns)
+        if attitude is not None:
+            messages.append(attitude)
+        return messages + self._news.due(self._facts(track, now_ns), now_ns)
 
     def admits(self, estimate: Estimate, now_ns: int) -> bool:
         """Say whether an estimate may go out now, and count it if not."""
-        if now_ns - estimate.t_ns > self._terms.max_age_ns:
+        self._late = now_ns - estimate.t_ns > self._terms.max_age_ns
+        if self._late:
             self._too_old += 1
             return False
         if self._holding():
@@ -161,13 +180,16 @@ class Dialogue:
         self._last_pose_ns = estimate.t_ns
         return True
 
+    def watch(self, t_ns: int, v_N: Array, yaw: float, now_ns: int) -> None:
+        """Take our velocity (3,) [m/s] and yaw [rad] in north-east-down, to be held against the autopilot's tilt."""
+        self._heading.take_pose(t_ns, v_N, yaw, self._watch.armed, now_ns)
+
     def state(self, now_ns: int) -> DialogueState:
         """Return what is known of the far end."""
-        away = self._heard_ns is not None and now_ns - self._heard_ns > STALE_NS
         origin = str(self._origin.state) if self.profile.needs_origin else ""
         return DialogueState(
-            self.peer, away, self.profile.name, self._sync.state(), origin, self._holding(), self._too_old,
-            self._too_close, self._watch.strangers,
+            self.peer, self._is_away(now_ns), self.profile.name, self._sync.state(), origin, self._holding(),
+            self._too_old, self._too_close, self._watch.strangers, yaw=self._heading.reading.alarm,
         )  # fmt: skip
 
     def _holding(self) -> str:
@@ -175,23 +197,17 @@ class Dialogue:
         waits = self.profile.needs_origin and self._terms.origin is not None and not self._origin.settled
         return f"origin: {self._origin.state}" if waits else ""
 
-    def _announcements(self, track: TrackState, now_ns: int) -> list[Message]:
-        """Return the news for the pilot."""
-        lost = track is TrackState.LOST
-        other = self._watch.other_autopilot
-        wrong = self._origin.state in (OriginState.LOST, OriginState.MISSING, OriginState.REFUSED)
-        news = (
-            self._announcer.say(
-                "track", f"track {track.value}", Severity.CRITICAL if lost else Severity.NOTICE, now_ns
-            ),
-            self._announcer.say(
-                "stranger", "" if other is None else f"autopilot {other} ignored", Severity.WARNING, now_ns
-            ),
-            self._announcer.say(
-                "origin", f"origin {self._origin.state.name.lower()}" if wrong else "", Severity.WARNING, now_ns
-            ),
-        )
-        return [message for message in news if message is not None]
+    def _facts(self, track: TrackState, now_ns: int) -> Facts:
+        """Return what the pilot may have to hear of."""
+        sync = self._sync.state()
+        restarts = 0 if sync is None else sync.restarts
+        return Facts(
+            track, self._late, self._is_away(now_ns), self._saturation.now, restarts, self._watch.other_autopilot,
+            self._origin.state, self._heading.reading.brief,
+        )  # fmt: skip
+
+    def _is_away(self, now_ns: int) -> bool:
+        return self._heard_ns is not None and now_ns - self._heard_ns > STALE_NS
 
 
 def _next_beat(due_ns: int | None, now_ns: int) -> int:

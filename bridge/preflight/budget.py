@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -102,7 +103,7 @@ def delay_lines(
     wiggle: what it showed, None where none was made.  lag_s: by how much the gyro's report lags [s].
     """
     if wiggle is not None:
-        yield from _wiggle_lines(wiggle, lag_s)
+        yield from _wiggle_lines(wiggle, lag_s, sync)
     name = NAMES.get(autopilot)
     if name is None:
         return
@@ -128,12 +129,18 @@ def _parameter_line(name: str, held_ms: float, wanted_ms: float, late_ms: float 
     return Line(Mark.WARN if wrong_ms <= MOST_MS else Mark.FAIL, name, found, needed, fix, write)
 
 
-def _wiggle_lines(wiggle: Delay | TooLittle, lag_s: float) -> Iterator[Line]:
+def _wiggle_lines(wiggle: Delay | TooLittle, lag_s: float, sync: SyncState | None) -> Iterator[Line]:
+    """Yield what the wiggle showed.
+
+    The clocks are known to half a round trip at worst, wherever in it the autopilot's instant lay: evenly spread, that
+    is a sigma of the half over root 3.
+    """
     what, needed = "stamps", f"true within {GOOD_STAMPS_MS:g} ms"
     if isinstance(wiggle, TooLittle):
         yield Line(Mark.UNKNOWN, what, wiggle.why, needed, "repeat --wiggle, turning it briskly about all axes")
         return
-    late_ms, sigma_ms = 1e3 * (wiggle.late_s + lag_s), 1e3 * wiggle.sigma_s
+    clock_ms = 0.0 if sync is None else math.hypot(sync.rtt_ms / math.sqrt(12.0), sync.spread_ms)
+    late_ms, sigma_ms = 1e3 * (wiggle.late_s + lag_s), math.hypot(1e3 * wiggle.sigma_s, clock_ms)
     found = f"{abs(late_ms):.1f} +- {sigma_ms:.1f} ms {'late' if late_ms >= 0 else 'early'}"
     found += f", agreement {100 * wiggle.correlation:.0f} %"
     if abs(late_ms) <= GOOD_STAMPS_MS:

@@ -8,6 +8,8 @@ from dataclasses import replace
 import pytest
 
 from bridge.dialogue import PROFILES, Dialogue, Origin, Terms
+from bridge.dialogue.news import Facts, News
+from bridge.dialogue.origin import OriginState
 from bridge.dialogue.peer import Autopilot
 from bridge.wire import Message
 from tests.bridge.dialogue.far_autopilot import BASE_NS, beat, from_autopilot, reply
@@ -121,10 +123,72 @@ def test_the_pilot_hears_of_a_change_once() -> None:
     dialogue = met("PX4")
     said: list[object] = []
     for k in range(200):
+        now_ns = BASE_NS + k * 50_000_000
         track = TrackState.LOST if 60 <= k < 120 else TrackState.TRACKING
-        said += texts(dialogue.due(track, BASE_NS + k * 50_000_000))
+        dialogue.take([beat(now_ns, system_id=3, kind="PX4")])
+        said += texts(dialogue.due(track, now_ns))
     assert said == ["posebridge: track tracking", "posebridge: track lost", "posebridge: track tracking"]
     assert all(len(str(text)) <= 50 for text in said)
+
+
+def test_poses_that_come_too_old_are_told_once_and_so_is_their_return() -> None:
+    dialogue = met("PX4")
+    said: list[object] = []
+    for k in range(200):
+        now_ns = BASE_NS + k * 20_000_000
+        dialogue.take([beat(now_ns, system_id=3, kind="PX4")])
+        dialogue.admits(estimate(t_ns=now_ns - (150_000_000 if 60 <= k < 120 else 0)), now_ns)
+        said += texts(dialogue.due(TrackState.TRACKING, now_ns))
+    assert said == [
+        "posebridge: track tracking", "posebridge: poses too old, none sent", "posebridge: poses in time again",
+    ]  # fmt: skip
+
+
+def test_an_autopilot_that_falls_silent_and_comes_back_is_told_of_once_each() -> None:
+    dialogue = met("PX4")
+    said: list[object] = []
+    for k in range(200):
+        now_ns = BASE_NS + k * 50_000_000
+        if k >= 120:
+            dialogue.take([beat(now_ns, system_id=3, kind="PX4")])
+        said += texts(dialogue.due(TrackState.TRACKING, now_ns))
+    assert said[1:] == ["posebridge: autopilot silent", "posebridge: autopilot heard again"]
+
+
+def test_a_link_that_is_full_for_long_is_told_of_and_a_single_stall_is_not() -> None:
+    dialogue = met("PX4")
+    said: list[object] = []
+    superseded = 0
+    for k in range(400):
+        superseded += k == 20 or 100 <= k < 200
+        said += texts(dialogue.due(TrackState.TRACKING, BASE_NS + k * 50_000_000, superseded))
+    assert said.count("posebridge: link full, rate reduced") == 1
+    assert said.count("posebridge: link free again") == 1
+    early = [text for k in range(80) for text in texts(met("PX4").due(TrackState.TRACKING, BASE_NS + k, k == 20))]
+    assert not any("link" in str(text) for text in early)
+
+
+def test_a_step_of_the_autopilots_clock_is_told_each_time_it_happens() -> None:
+    dialogue = met("PX4")
+    said: list[object] = []
+    far_ns = 90_000_000_000
+    for k in range(60):
+        now_ns = BASE_NS + k * 1_000_000_000
+        far_ns += 1_000_000_000 + (k in (20, 40)) * 5_000_000_000
+        due = dialogue.due(TrackState.TRACKING, now_ns)
+        said += texts(due)
+        dialogue.take([replace(reply(m, now_ns + 2_000_000, far_ns), system_id=3) for m in due if m.name == "TIMESYNC"])
+    stepped = [text for text in said if "clock" in str(text)]
+    assert stepped == ["posebridge: autopilot clock stepped (1)", "posebridge: autopilot clock stepped (2)"]
+
+
+def test_no_text_is_cut_by_the_fifty_bytes_that_statustext_holds() -> None:
+    news = News()
+    facts = Facts(TrackState.TRACKING, True, True, True, 99, 254, OriginState.REFUSED)
+    well = replace(facts, late=False, away=False, saturated=False, track=TrackState.SEARCHING)
+    for k, each in enumerate((facts, well)):
+        for text in texts(news.due(each, BASE_NS + k * 2_000_000_000)):
+            assert len(str(text).encode()) <= 50
 
 
 def test_a_reboot_of_the_autopilot_starts_the_matter_of_the_origin_anew() -> None:

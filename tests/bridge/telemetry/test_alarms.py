@@ -45,6 +45,7 @@ def around(links: tuple[LinkState, ...] = (UP,), log: LogState = LOG, far_end: D
 
 
 FAULTS: dict[str, Readings] = {
+    "yaw_wrong": around(far_end=replace(TALKING, yaw="yaw is +90 +/- 3 deg off")),
     "track_lost": replace(WELL, state=TrackState.LOST, state_s=2.0, rate_hz=0.0),
     "marker_not_found": replace(WELL, state=TrackState.SEARCHING, rate_hz=0.0),
     "rate": replace(WELL, rate_hz=12.0),

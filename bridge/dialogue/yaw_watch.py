@@ -41,6 +41,11 @@ class YawReading:
     known: bool
     alarm: str
 
+    @property
+    def brief(self) -> str:
+        """The alarm in a STATUSTEXT's length, empty when all is well."""
+        return "yaw wrong: take over by hand and land" if self.alarm else ""  # without a figure it is said once
+
 
 NOTHING = YawReading(0.0, math.inf, 0.0, known=False, alarm="")
 
@@ -164,7 +169,4 @@ def tilt_acceleration(roll: float, pitch: float, yaw: float) -> Array:
 
 
 def _alarm(error_deg: float, sigma_deg: float) -> str:
-    return (
-        f"yaw is {error_deg:+.0f} +/- {sigma_deg:.0f} deg off against the motion: it steers the wrong way; "
-        "take over by hand and land"
-    )
+    return f"yaw is {error_deg:+.0f} +/- {sigma_deg:.0f} deg off against the motion: it steers the wrong way"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from bridge.preflight.yaw_watch import ALARM_DEG, YawReading, YawWatch, tilt_acceleration
-from tests.bridge.preflight.flights import Sample, fly
+from bridge.dialogue.yaw_watch import ALARM_DEG, YawReading, YawWatch, tilt_acceleration
+from tests.bridge.dialogue.flights import Sample, fly
 from tracker import so3
 
 
@@ -43,7 +43,7 @@ def test_a_yaw_that_flies_well_gives_no_alarm(error_deg: float) -> None:
 def test_a_yaw_that_flies_away_is_told_within_eight_seconds(error_deg: float) -> None:
     """A real autopilot with 90 deg was 200 m away after 11 to 20 s."""
     for seed in range(5):
-        assert "take over by hand" in watched(list(fly(seed, 8.0, error_deg))).alarm
+        assert "steers the wrong way" in watched(list(fly(seed, 8.0, error_deg))).alarm
 
 
 def test_the_standard_error_is_not_too_small_and_less_than_twice_too_large() -> None:
