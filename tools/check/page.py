@@ -56,20 +56,24 @@ def to_json(sections: tuple[Section, ...], unchecked: tuple[str, ...]) -> str:
 
 
 def _rows(line: Line) -> Iterator[Text]:
-    """Yield a line in its columns, each wrapped within its own, and the fix below."""
-    what, found = _wrapped(line.what, _WHAT - 1), _wrapped(line.found, _FOUND - 1)
-    if len(line.what) >= _WHAT and line.what.startswith('"'):  # a text it said has a row of its own
+    """Yield a line, and the fix below."""
+    if line.what.startswith('"'):  # a text it said, with its meaning: neither column holds it
         yield _row(line.mark, line.what)
-        what = []
-    needed = _wrapped(line.needed, WIDTH - _MARK - _WHAT - _FOUND)
-    first = bool(what)
-    for left, middle, right in zip_longest(what or [""], found, needed, fillvalue=""):
-        cells = f"{left:<{_WHAT}}{middle:<{_FOUND}}{right}".rstrip()
-        yield _row(line.mark, cells) if first else Text(" " * _MARK + cells)
-        first = False
+        yield from (Text(" " * (_MARK + 2) + row) for row in _wrapped(line.found, WIDTH - _MARK - 2))
+    else:
+        yield from _columns(line)
     if line.fix:
         for row in textwrap.wrap(f"-> {line.fix}", WIDTH - _MARK - 2, subsequent_indent="   "):
             yield Text(" " * (_MARK + 2) + row, style=_STYLES[line.mark])
+
+
+def _columns(line: Line) -> Iterator[Text]:
+    """Yield what was looked at, what was found and what it must be beside each other, each wrapped within its own."""
+    what, found = _wrapped(line.what, _WHAT - 1), _wrapped(line.found, _FOUND - 1)
+    needed = _wrapped(line.needed, WIDTH - _MARK - _WHAT - _FOUND)
+    for row, (left, middle, right) in enumerate(zip_longest(what, found, needed, fillvalue="")):
+        cells = f"{left:<{_WHAT}}{middle:<{_FOUND}}{right}".rstrip()
+        yield Text(" " * _MARK + cells) if row else _row(line.mark, cells)
 
 
 def _noted(note: str) -> list[str]:

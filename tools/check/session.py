@@ -123,7 +123,7 @@ class Terminal:
             raise OperatorError("--apply: no terminal to ask on; add --yes to write without asking")
         for write in wanted:
             self.tell(f"would set {write.name} {figure(write.value)}" + (", reboot needed" if write.reboot else ""))
-        return self._console.input("posebridge: write these? [y/N] ").strip().lower() in ("y", "yes")
+        return self._console.input("posebridge: write these? [y/N] ", markup=False).strip().lower() in ("y", "yes")
 
 
 def _settings(request: CheckRequest) -> Settings:

@@ -15,6 +15,7 @@ from bridge.pack import Encoder, Identity, Packer, make_message
 from bridge.preflight.preflight import Given, Preflight
 from bridge.preflight.verdict import Line, Mark, Section, Write
 from tests.tools.check.hand import Hand
+from tests.tools.check.px4_stand_in import StandIn
 from tools.check.request import CheckRequest
 from tools.check.script import Script
 from tools.check.session import check
@@ -28,8 +29,8 @@ from tracker import so3
 from tracker.types import Array, Estimate, Event, Silence, Step, TrackState
 
 START_NS = 50_000_000_000
-STEP_NS = 1_000_000
-ROUND, FINE_ROUND = 20, 5  # steps between two of the autopilot's rounds; its gyro's readings are means over one
+STEP_NS = 2_000_000
+ROUND, FINE_ROUND = 10, 2  # steps between two of the autopilot's rounds; its gyro's readings are means over one
 TRACK_NS = 5_000_000
 AS_DELAYED = {**FOR_VISION, "VISO_DELAY_MS": 35, "SERIAL1_BAUD": 921}
 """An autopilot as config/ardupilot-heli.parm has it, for a camera delay of 30 ms and 5 ms of tracking."""
@@ -57,16 +58,26 @@ class Mistake:
 
 
 class Rehearsal:
-    """One check. room_yaw_deg: heading of the room's x axis, as it truly is [deg]."""
+    """One check.
 
-    def __init__(self, mistake: Mistake, room_yaw_deg: float = 30.0, rate_hz: float = 30.0) -> None:
+    room_yaw_deg: heading of the room's x axis, as it truly is [deg].  autopilot: None for the simulated one.
+    """
+
+    def __init__(
+        self,
+        mistake: Mistake,
+        room_yaw_deg: float = 30.0,
+        rate_hz: float = 30.0,
+        autopilot: Autopilot | StandIn | None = None,
+    ) -> None:
         self._mistake = mistake
         self._rate_hz = rate_hz
         self.hand = Hand(math.radians(room_yaw_deg))  # nose to north
         p_BinW, R_BtoW = self.hand.pose_at(0.0)
         rest = State(p_BinW, R_BtoW, np.zeros(3), np.zeros(3), np.zeros(2), 0.0)
         self._course = Course(START_NS, rest, STEP_NS)
-        self.autopilot = Autopilot(None, {**AS_DELAYED, **mistake.parameters}, booted_ns=START_NS - 30_000_000_000)
+        booted_ns = START_NS - 30_000_000_000
+        self.autopilot = autopilot or Autopilot(None, {**AS_DELAYED, **mistake.parameters}, booted_ns=booted_ns)
         self._imu = Imu(ImuNoise(), np.random.default_rng(1))
         self._noise = np.random.default_rng(2)
         self._wire = UdpWire(("127.0.0.1", self.autopilot.port))
@@ -198,6 +209,6 @@ class Rehearsal:
             self.autopilot.hear(self.now_ns())
         for datagram in self._wire.receive():
             self._link.deliver(datagram)
-        if self._mistake.second and self._steps % 1000 == 500:
+        if self._mistake.second and self._steps % 500 == 250:
             beat = make_message("HEARTBEAT", self.now_ns(), type=2, autopilot=3, mavlink_version=3)
             self._link.deliver(self._stranger(beat, 0))
