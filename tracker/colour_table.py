@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tracker.rig import Ball, Colour
+from tracker.tint import NEUTRAL, UNITY, Gains
 
 HUE_STEPS = 180  # OpenCV's 8-bit hue counts half degrees
 LEVELS = 256
@@ -23,16 +24,29 @@ class ColourTable:
     A pixel has a colour when the spread between its largest and least channel is at least that of its largest
     channel in `least_spread` (n, 256), and its hue, 0..179, is one of `hues` (n, 180).
     lowest_spread: the least of all colours, (256,): nearly every pixel of a room stays below it.
+    blue, red: what a pixel's blue and red are multiplied by first, in 1 / UNITY, to undo the colour of the light.
     """
 
     least_spread: NDArray[np.int16]
     lowest_spread: NDArray[np.int16]
     hues: NDArray[np.bool_]
+    blue: int = UNITY
+    red: int = UNITY
+
+
+def colours_of(balls: tuple[Ball, ...], gains: Gains = NEUTRAL) -> ColourTable:
+    """Return the tables of the balls' colours in a light."""
+    blue, red = gains.undoing
+    return _in_light(balls, blue, red)
+
+
+@lru_cache(maxsize=1024)
+def _in_light(balls: tuple[Ball, ...], blue: int, red: int) -> ColourTable:
+    return replace(_tables(balls), blue=blue, red=red)
 
 
 @lru_cache(maxsize=64)
-def colours_of(balls: tuple[Ball, ...]) -> ColourTable:
-    """Return the tables of the balls' colours, made once for each tuple of balls."""
+def _tables(balls: tuple[Ball, ...]) -> ColourTable:
     least_spread = np.stack([_least_spread(ball.colour) for ball in balls])
     made = ColourTable(least_spread, least_spread.min(axis=0), np.stack([_hues(ball.colour) for ball in balls]))
     for table in (made.least_spread, made.lowest_spread, made.hues):

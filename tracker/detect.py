@@ -10,6 +10,7 @@ import numpy as np
 from tracker.colour_table import ColourTable, colours_of
 from tracker.rig import Ball
 from tracker.spots import find_spots
+from tracker.tint import NEUTRAL, Gains
 from tracker.types import Array, Image, frozen_array
 
 
@@ -39,7 +40,9 @@ def region_around(uv_px: Array, half_px: Array, width_px: int, height_px: int) -
     return Region(left, top, right, bottom) if left < right and top < bottom else None
 
 
-def find_blobs(image: Image, region: Region | None, balls: tuple[Ball, ...], max_area_px: float) -> list[list[Blob]]:
+def find_blobs(
+    image: Image, region: Region | None, balls: tuple[Ball, ...], max_area_px: float, gains: Gains = NEUTRAL
+) -> list[list[Blob]]:
     """Find the blobs of each ball's colour.
 
     Args:
@@ -47,6 +50,7 @@ def find_blobs(image: Image, region: Region | None, balls: tuple[Ball, ...], max
         region: where to look; None for the whole image.
         balls: what to look for.
         max_area_px: larger blobs are no ball [px^2].
+        gains: of the light.
     Returns:
         For each ball its blobs in the whole image's pixels, largest first.
     """
@@ -54,7 +58,7 @@ def find_blobs(image: Image, region: Region | None, balls: tuple[Ball, ...], max
         height, width = image.shape[:2]
         region = Region(0, 0, width, height)
     blobs: list[list[Blob]] = [[] for _ in balls]
-    for ball, u, v, area in spots_in(image, region, colours_of(balls), max_area_px).tolist():
+    for ball, u, v, area in spots_in(image, region, colours_of(balls, gains), max_area_px).tolist():
         blobs[int(ball)].append(Blob(frozen_array((u, v)), area))
     return blobs
 
@@ -85,5 +89,7 @@ def spots_in(image: Image, region: Region, colours: ColourTable, max_area_px: fl
         colours.least_spread,
         colours.lowest_spread,
         colours.hues,
+        colours.blue,
+        colours.red,
         float(max_area_px),
     )

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
+from tracker.appearance import MISFIT_MAX
 from tracker.look import Fitted, Look, look_near
 from tracker.rig import Rig
 from tracker.rivals import first_rivals
 from tracker.state import State
-from tracker.types import Frame
+from tracker.tint import Gains, Tint, core_colour
+from tracker.types import Array, Frame
 from tracker.view import unknown_streak_px
 
+LIGHT_BALLS = 2  # a single ball that is something else would tell of a light that is not there
 LEARN_ALL = 72  # balls of each camera; then
 LEARN_EVERY = 4  # rounds one ball
 BLIND_PX = 0.5  # of the streak's sigma: how fast the balls move is not known
@@ -25,6 +29,7 @@ class Eyes:
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
         self._rivals = [first_rivals() for _ in rig.cameras]
+        self._tints = [Tint() for _ in rig.cameras]
         self._turn = 0
         self._taught_blindly = False
 
@@ -38,9 +43,22 @@ class Eyes:
         """Return how long the slowest shutter stands open, as learned [s]."""
         return max(rivals.best.response.exposure_s for rivals in self._rivals)
 
+    @property
+    def gains(self) -> tuple[Gains, ...]:
+        """Return the colour of the light in each camera."""
+        return tuple(tint.gains for tint in self._tints)
+
+    def other_gains(self, number: int) -> tuple[Gains, ...]:
+        """Return another light to look for balls under, for each camera; numbers go round, the nearest first."""
+        return tuple(tint.other(number) for tint in self._tints)
+
+    def suppose(self, gains: Sequence[Gains]) -> None:
+        """Take the light in each camera to be so."""
+        self._tints = [replace(tint, gains=one) for tint, one in zip(self._tints, gains, strict=True)]
+
     def look(self, frames: Sequence[Frame], state: State) -> Look:
         """Find each ball in each image where a state expects it."""
-        look = look_near(frames, self._rig, state, [rivals.best for rivals in self._rivals])
+        look = look_near(frames, self._rig, state, [rivals.best for rivals in self._rivals], self.gains)
         doubt_px = SMEAR_DOUBT * self._streak_px(state)
         return look.doubted(doubt_px) if doubt_px > SMEAR_DOUBT * BLIND_PX else look
 
@@ -58,6 +76,7 @@ class Eyes:
         blindly: how fast they moved was not known. It is better than nothing, and forgotten if they did move.
         """
         self._turn += 1
+        self._follow_the_light(fitted)
         if self._taught_blindly and not blindly:
             self._taught_blindly = False
             if any(math.hypot(*one.expected.streak_px) > LONG_STREAK_PX for one in fitted):
@@ -69,3 +88,15 @@ class Eyes:
             index = one.frame.camera
             camera, image = self._rig.cameras[index], one.frame.image
             self._rivals[index] = self._rivals[index].learned(image, camera, one.expected, one.centre)
+
+    def _follow_the_light(self, fitted: Sequence[Fitted]) -> None:
+        """Learn each camera's light from the colours of the balls that it sees well."""
+        for camera, tint in enumerate(self._tints):
+            seen = [one for one in fitted if one.frame.camera == camera and one.centre.misfit <= MISFIT_MAX]
+            if len(seen) >= LIGHT_BALLS:
+                self._tints[camera] = tint.learned([(one.sighting.ball, _colour(one)) for one in seen])
+
+
+def _colour(one: Fitted) -> Array:
+    u, v = one.centre.uv_px.tolist()
+    return core_colour(one.frame.image, u, v, one.expected.radius_px)

@@ -17,6 +17,7 @@ from tracker.patch import Expected
 from tracker.rig import Rig
 from tracker.sight import Sight, find_ball
 from tracker.state import State
+from tracker.tint import NEUTRAL, Gains
 from tracker.types import BallSighting, Frame, Reason, Rejected, frozen_array
 from tracker.view import DEPTH, RAY_X, RAY_Y, U, V, expected_views
 
@@ -48,18 +49,26 @@ class Look:
         return Look(fitted, self.rejections)
 
 
-def look_near(frames: Sequence[Frame], rig: Rig, state: State, appearances: Sequence[Appearance]) -> Look:
+def look_near(
+    frames: Sequence[Frame],
+    rig: Rig,
+    state: State,
+    appearances: Sequence[Appearance],
+    gains: Sequence[Gains] = (),
+) -> Look:
     """Find each ball in each image, in the region where a state, with its covariance, expects it.
 
     Args:
         frames: of different cameras, at about one time.
         state: carried to about that time.
         appearances: how balls look to each camera of the rig.
+        gains: of the light in each camera; none for the config's light.
     """
     fitted: list[Fitted] = []
     rejections: list[Rejected] = []
     for frame in frames:
-        for b, found in _balls_of(frame, rig, state, appearances[frame.camera]):
+        light = gains[frame.camera] if gains else NEUTRAL
+        for b, found in _balls_of(frame, rig, state, appearances[frame.camera], light):
             if isinstance(found, Rejected):
                 rejections.append(found)
             else:
@@ -68,7 +77,9 @@ def look_near(frames: Sequence[Frame], rig: Rig, state: State, appearances: Sequ
     return Look(tuple(fitted), tuple(rejections))
 
 
-def _balls_of(frame: Frame, rig: Rig, state: State, appearance: Appearance) -> Iterator[tuple[int, Sight | Rejected]]:
+def _balls_of(
+    frame: Frame, rig: Rig, state: State, appearance: Appearance, gains: Gains
+) -> Iterator[tuple[int, Sight | Rejected]]:
     """Yield each ball of the marker as seen near its prediction, or why it is not."""
     camera = rig.cameras[frame.camera]
     views = expected_views(state, rig, frame.camera, frame.t_ns).tolist()
@@ -77,7 +88,7 @@ def _balls_of(frame: Frame, rig: Rig, state: State, appearance: Appearance) -> I
             yield b, Rejected(Reason.BEHIND, f"{ball.name} is not before the camera", frame.t_ns, frame.camera)
             continue
         shades = appearance.shades(camera, view[RAY_X], view[RAY_Y])
-        found = find_ball(frame.image, colours_of((ball,)), view, shades, appearance.response)
+        found = find_ball(frame.image, colours_of((ball,), gains), view, shades, appearance.response)
         if isinstance(found, Reason):
             detail = f"no {ball.name} at ({view[U]:.0f}, {view[V]:.0f}) px, where it is expected"
             yield b, Rejected(found, detail, frame.t_ns, frame.camera)
@@ -85,8 +96,8 @@ def _balls_of(frame: Frame, rig: Rig, state: State, appearance: Appearance) -> I
             yield b, found
 
 
-def look_everywhere(frame: Frame, camera: Camera, rig: Rig) -> list[list[Blob]]:
-    """Return for each ball of the marker the blobs of its colour in the whole image, largest first."""
+def look_everywhere(frame: Frame, camera: Camera, rig: Rig, gains: Gains = NEUTRAL) -> list[list[Blob]]:
+    """Return for each ball of the marker the blobs of its colour in the whole image, in a light, largest first."""
     largest = max(ball.radius_m for ball in rig.marker.balls)
     most_px = math.pi * (camera.focal_px * largest / NEAREST_M) ** 2
-    return find_blobs(frame.image, None, rig.marker.balls, most_px)
+    return find_blobs(frame.image, None, rig.marker.balls, most_px, gains)

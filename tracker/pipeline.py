@@ -9,14 +9,14 @@ It reads no clock but the stopwatch it is given, and touches no file and no devi
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
 import numpy as np
 
 from tracker import so3
-from tracker.acquire import first_state
+from tracker.acquire import Seen, first_state
 from tracker.bias import shared_covariance
 from tracker.detect import Blob
 from tracker.ekf import Update, update
@@ -29,6 +29,7 @@ from tracker.predict import Prediction, first_guess, predict
 from tracker.rig import Rig
 from tracker.rounds import Rounds
 from tracker.state import OFFSETS, REPORTED, State
+from tracker.tint import Gains
 from tracker.tuning import Tuning
 from tracker.types import (
     BallSighting,
@@ -83,6 +84,7 @@ class Tracker:
         self._history = History()
         self._whole: dict[int, tuple[Frame, list[list[Blob]]]] = {}
         self._track = TrackState.SEARCHING
+        self._lights_tried = 0
         self._resets = 0
         self._sent_ns = -(2**63)
 
@@ -207,17 +209,13 @@ class Tracker:
 
     def _search(self, frames: Round, t_ns: int, harvest: _Harvest) -> Update | None:
         """Look for the marker in whole frames, this round's and the other cameras' newest; start the track on it."""
+        gains = self._eyes.gains
         for frame in frames:
-            camera = self._rig.cameras[frame.camera]
-            self._whole[frame.camera] = (frame, look_everywhere(frame, camera, self._rig))
+            self._whole[frame.camera] = (frame, self._look_everywhere(frame, gains))
         fresh = {c: w for c, w in self._whole.items() if t_ns - w[0].t_ns <= self._tuning.coast_limit_ns // 2}
-        start = first_state(fresh, self._rig, self._tuning.process)
-        if isinstance(start, Rejected):
-            harvest.rejections.append(start)
-            return None
-        guess = first_guess(self._still_known(start), self._tuning.process)
-        together = tuple(frame for frame, _ in fresh.values())
-        found = self._study(together, guess, harvest, start=True)
+        found = self._start(fresh, harvest)
+        if found is None and self._track is not TrackState.TRACKING:
+            found = self._search_in_other_light(fresh)
         if found is None:
             return None
         before = self._history.newest
@@ -227,6 +225,29 @@ class Tracker:
         self._history.restart(found)
         self._track = TrackState.TRACKING
         return found
+
+    def _look_everywhere(self, frame: Frame, gains: Sequence[Gains]) -> list[list[Blob]]:
+        return look_everywhere(frame, self._rig.cameras[frame.camera], self._rig, gains[frame.camera])
+
+    def _search_in_other_light(self, fresh: Seen) -> Update | None:
+        """Look at the same frames as if the light had another colour, each time another one."""
+        gains, others = self._eyes.gains, self._eyes.other_gains(self._lights_tried)
+        self._lights_tried += 1
+        self._eyes.suppose(others)
+        seen = {camera: (frame, self._look_everywhere(frame, others)) for camera, (frame, _) in fresh.items()}
+        found = self._start(seen, _Harvest())
+        if found is None:
+            self._eyes.suppose(gains)
+        return found
+
+    def _start(self, seen: Seen, harvest: _Harvest) -> Update | None:
+        """Start on the marker among blobs, if every ball's image bears it out."""
+        start = first_state(seen, self._rig, self._tuning.process)
+        if isinstance(start, Rejected):
+            harvest.rejections.append(start)
+            return None
+        guess = first_guess(self._still_known(start), self._tuning.process)
+        return self._study(tuple(frame for frame, _ in seen.values()), guess, harvest, start=True)
 
     def _all_seen_twice(self, found: Update) -> bool:
         """Say whether a start is borne out by every ball in two cameras: less fits many places."""

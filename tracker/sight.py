@@ -58,8 +58,8 @@ def find_ball(
     fit = np.empty((5, 2))
     status = _find_and_fit(
         image, colour.least_spread, colour.lowest_spread, colour.hues, u, v, S_uu, S_uv, S_vv, radius_px, edge_px, half,
-        response.block_px, light_of(response.gamma), trust_of(response.gamma), luma.fine, chroma.fine, luma.per_px,
-        luma.radius_px, places_along(streak_px, luma.per_px), fit,
+        response.block_px, colour.blue, colour.red, light_of(response.gamma), trust_of(response.gamma), luma.fine,
+        chroma.fine, luma.per_px, luma.radius_px, places_along(streak_px, luma.per_px), fit,
     )  # fmt: skip
     if status != _FOUND:
         return _REASONS[status]
@@ -71,14 +71,14 @@ def find_ball(
 
 @compiled(
     "i8(Array(u1, 3, 'C', True), Array(i2, 2, 'C', True), Array(i2, 1, 'C', True), Array(b1, 2, 'C', True), f8, f8,"
-    "f8, f8, f8, f8, f8, i8, i8, f8[::1], f8[::1], Array(f4, 3, 'C', True), Array(f4, 3, 'C', True), i8, f8,"
+    "f8, f8, f8, f8, f8, i8, i8, i8, i8, f8[::1], f8[::1], Array(f4, 3, 'C', True), Array(f4, 3, 'C', True), i8, f8,"
     "i8[:, ::1], f8[:, ::1])"
 )
 def _find_and_fit(
     image: Image, least_spread: NDArray[np.int16], lowest_spread: NDArray[np.int16], hues: NDArray[np.bool_],
     u: float, v: float, S_uu: float, S_uv: float, S_vv: float, radius_px: float, edge_px: float, half: int,
-    block: int, light: Array, trust: Array, luma: NDArray[np.float32], chroma: NDArray[np.float32], per_px: int,
-    drawn_px: float, places: NDArray[np.int64], fit: Array,
+    block: int, blue: int, red: int, light: Array, trust: Array, luma: NDArray[np.float32], chroma: NDArray[np.float32],
+    per_px: int, drawn_px: float, places: NDArray[np.int64], fit: Array,
 ) -> int:  # fmt: skip
     """Find the spot nearest the prediction, cut its pixels out and fit them.
 
@@ -93,7 +93,8 @@ def _find_and_fit(
     if not (left < right and top < bottom):
         return _OUT_OF_VIEW
     area = math.pi * radius_px**2
-    spots = find_spots(image, left, top, right, bottom, least_spread, lowest_spread, hues, MOST_AREA_SHARE * area)
+    most_px = MOST_AREA_SHARE * area
+    spots = find_spots(image, left, top, right, bottom, least_spread, lowest_spread, hues, blue, red, most_px)
     nearest, least = -1, np.inf
     for k in range(len(spots)):
         du, dv = spots[k, 1] - u, spots[k, 2] - v

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from tracker.colour_table import FIXED_POINT, HUE_STEPS, LEVELS
 from tracker.compiled import compiled
+from tracker.tint import UNITY
 from tracker.types import Array, Image
 
 MIN_AREA_PX = 4
@@ -91,14 +92,22 @@ def _likely(spots: NDArray[np.int64], count: int, most_px: float) -> Array:
     return likely[:kept].copy()
 
 
-@compiled("i8(Array(u1, 3, 'C', readonly=True), i8, i8, i8, Array(i2, 1, 'C', readonly=True), i8[:, ::1])")
+@compiled("i8(Array(u1, 3, 'C', readonly=True), i8, i8, i8, Array(i2, 1, 'C', readonly=True), i8, i8, i8[:, ::1])")
 def _coloured(
-    image: Image, row: int, left: int, right: int, lowest_spread: NDArray[np.int16], pixels: NDArray[np.int64]
+    image: Image,
+    row: int,
+    left: int,
+    right: int,
+    lowest_spread: NDArray[np.int16],
+    blue_by: int,
+    red_by: int,
+    pixels: NDArray[np.int64],
 ) -> int:
     """Write column, value, spread and hue of a row's pixels that may have a colour, and return how many they are."""
     found = 0
     for column in range(left, right):
-        blue, green, red = image[row, column, 0], image[row, column, 1], image[row, column, 2]
+        blue = min(255, image[row, column, 0] * blue_by // UNITY)
+        green, red = image[row, column, 1], min(255, image[row, column, 2] * red_by // UNITY)
         value = max(blue, green, red)
         spread = value - min(blue, green, red)
         if spread >= lowest_spread[value]:
@@ -166,7 +175,7 @@ def _with_room(spots: NDArray[np.int64], needed: int) -> NDArray[np.int64]:
 
 @compiled(
     "f8[:, ::1](Array(u1, 3, 'C', readonly=True), i8, i8, i8, i8, Array(i2, 2, 'C', readonly=True),"
-    "Array(i2, 1, 'C', readonly=True), Array(b1, 2, 'C', readonly=True), f8)"
+    "Array(i2, 1, 'C', readonly=True), Array(b1, 2, 'C', readonly=True), i8, i8, f8)"
 )
 def find_spots(
     image: Image,
@@ -177,6 +186,8 @@ def find_spots(
     least_spread: NDArray[np.int16],
     lowest_spread: NDArray[np.int16],
     hues: NDArray[np.bool_],
+    blue: int,
+    red: int,
     most_px: float,
 ) -> Array:
     """Find the spots of each of n colours; pixels that touch by a side or a corner belong together.
@@ -184,7 +195,7 @@ def find_spots(
     Args:
         image: (height, width, 3) BGR.
         left, top, right, bottom: where to look, within the image; right and bottom exclusive.
-        least_spread, lowest_spread, hues: the colours, as in `tracker.colour_table.ColourTable`.
+        least_spread, lowest_spread, hues, blue, red: the colours, as in `tracker.colour_table.ColourTable`.
         most_px: larger spots are none [px^2].
     Returns:
         (m, 4): index of the colour, centroid u and v in the whole image [px], area [px^2]; largest first.
@@ -197,7 +208,7 @@ def find_spots(
     lengths = np.zeros((2, colours), np.int64)
     for row in range(top, bottom):
         above, here = (row - 1) & 1, row & 1
-        found = _coloured(image, row, left, right, lowest_spread, pixels)
+        found = _coloured(image, row, left, right, lowest_spread, blue, red, pixels)
         for ball in range(colours):
             length = _runs(pixels, found, least_spread[ball], hues[ball], runs[here, ball])
             lengths[here, ball] = length
