@@ -3,6 +3,9 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# Tests receive with it. Its own requirements are left out: since this version they hold VTK and the OpenCV with windows,
+# whose files overwrite those of the headless one; as a plain receiver it needs none of them, and pymavlink is there.
+MAVPROXY := MAVProxy==1.8.75
 STAMP := $(VENV)/.installed
 
 # Options of the demo: make demo DURATION_S=20 SEED=3 OUT=logs/demo PACE=fast
@@ -32,6 +35,7 @@ $(STAMP): pyproject.toml
 	this is %d.%d: name another, make PYTHON=python3.12" % sys.version_info[:2])'
 	$(PYTHON) -m venv --clear $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps '$(MAVPROXY)'
 	@touch $@
 
 clean:

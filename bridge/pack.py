@@ -198,6 +198,11 @@ def message_id(name: str) -> int:
     return int(_CLASSES[name].id)
 
 
+def frame_bytes(name: str) -> int:
+    """Return how long a message's unsigned MAVLink 2 frame is at most [bytes]."""
+    return int(_CLASSES[name].unpacker.size) + 2 + int(dialect.HEADER_LEN_V2)
+
+
 def make_message(name: str, t_ns: int, slot: str = "", /, **fields: FieldValue) -> Message:
     """Return any message of the dialect; fields left out are zero, a text is cut to its field's length.
 

@@ -11,11 +11,14 @@ from types import TracebackType
 from typing import Self
 
 from bridge.backlog import Backlog
+from bridge.heard import NOTHING, Heard
 from bridge.log.entry import Entry, make_entry
 from bridge.log.stream import open_stream
+from bridge.log.tlog import TlogWriter
 from bridge.log.writer import Cover, LogWriter
 from bridge.wire import Sent
 from tracker.camera import Camera
+from tracker.errors import OperatorError
 from tracker.rig import Marker
 from tracker.types import Event, Step
 
@@ -55,7 +58,8 @@ class Recorder:
         metadata: names and values by topic, such as versions, source URI and command line.
         cameras, marker: as tracked with, drawn into the log.
         wall_clock: reads the wall clock [ns since 1970]; noted once a second beside stream time.
-        overwrite: replace a file that exists.
+        tlog: a new file for the MAVLink frames alone, None for none.
+        overwrite: replace files that exist.
         block_when_full: wait for the disk instead of dropping, for input that is not live.
         capacity: steps the queue holds; 1024 are some 17 s of two cameras at 30 Hz.
     Raises:
@@ -71,6 +75,7 @@ class Recorder:
         cameras: tuple[Camera, ...],
         marker: Marker,
         wall_clock: Callable[[], int],
+        tlog: Path | None = None,
         overwrite: bool = False,
         block_when_full: bool = False,
         capacity: int = CAPACITY,
@@ -79,6 +84,7 @@ class Recorder:
         self._wall_clock = wall_clock
         self._block = block_when_full
         self._stream = open_stream(path, overwrite)
+        self._tlog = self._open_tlog(tlog, overwrite)
         self._cover = Cover(attachments, metadata, cameras, marker, wall_clock())
         self._backlog = Backlog(capacity)
         self._clock_due_ns: int | None = None
@@ -92,18 +98,20 @@ class Recorder:
         self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
         self._thread.start()
 
-    def take(self, event: Event | None, step: Step, sent: tuple[Sent, ...], now_ns: int) -> None:
+    def take(
+        self, event: Event | None, step: Step, sent: tuple[Sent, ...], now_ns: int, heard: Heard = NOTHING
+    ) -> None:
         """Queue one turn of the loop at stream time `now_ns` [ns]; returns at once unless `block_when_full`.
 
         event: None at the end of all events.
         """
-        entry = make_entry(event, step, sent, now_ns, self._wall_time_if_due(now_ns))
+        entry = make_entry(event, step, sent, now_ns, self._wall_time_if_due(now_ns), heard)
         if self._closed or not self._put(entry):
             self._refused += 1
 
     def state(self) -> RecorderState:
         """Say how the recording stands."""
-        error = self._error
+        error = self._error or (None if self._tlog is None else self._tlog.error)
         if error is None and not self._closed and not self._thread.is_alive():
             error = f"log {self._path}: the recorder's thread is gone, which is a bug; its traceback is on stderr"
         return RecorderState(self._path, self._written, self._refused + self._lost, self._stream.size_bytes, error)
@@ -141,6 +149,13 @@ class Recorder:
             self._backlog.wait_for_room(STALL_S)
         return True
 
+    def _open_tlog(self, path: Path | None, overwrite: bool) -> TlogWriter | None:
+        try:
+            return None if path is None else TlogWriter(path, overwrite)
+        except OperatorError:
+            self._stream.close()
+            raise
+
     def _begin(self) -> LogWriter | None:
         try:
             return LogWriter(self._stream, self._cover)
@@ -156,6 +171,8 @@ class Recorder:
                 self._stop(error)
         if self._error is not None:
             self._discard()
+        if self._tlog is not None:
+            self._tlog.close()
 
     def _record(self, writer: LogWriter) -> None:
         """Write entries until the last."""
@@ -167,6 +184,8 @@ class Recorder:
                 continue
             self._pending += 1
             writer.write(entry)
+            if self._tlog is not None:
+                self._tlog.write(entry)
             if self._refused > warned:
                 writer.warn(entry.now_ns, f"{self._refused - warned} steps dropped: the disk is too slow")
                 warned = self._refused
@@ -178,6 +197,8 @@ class Recorder:
 
     def _flush(self, writer: LogWriter) -> None:
         writer.flush()
+        if self._tlog is not None:
+            self._tlog.flush()
         self._written += self._pending
         self._pending = 0
 

@@ -8,10 +8,11 @@ One thread, no queue between its parts: an estimate is on the wire before anythi
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from bridge.clock import Clock
+from bridge.heard import Heard, Hearer
 from bridge.monitor import Monitor
 from bridge.outlet import Outlet
 from bridge.recorder import RecorderState
@@ -36,8 +37,8 @@ class Steps(Protocol):
 class Records(Protocol):
     """What keeps every step: `bridge.recorder.Recorder`."""
 
-    def take(self, event: Event | None, step: Step, sent: tuple[Sent, ...], now_ns: int) -> None:
-        """Keep one turn of the loop."""
+    def take(self, event: Event | None, step: Step, sent: tuple[Sent, ...], now_ns: int, heard: Heard) -> None:
+        """Keep one turn of the loop, and what was heard meanwhile."""
 
     def state(self) -> RecorderState:
         """Say how the recording stands."""
@@ -55,6 +56,7 @@ class Outlets:
     recorder: Records | None = None
     status: StatusLine | None = None
     telemetry: Telemetry | None = None
+    hearer: Hearer = field(default_factory=Hearer)
 
     def log_state(self) -> str:
         """Say in a word or two how the log fares."""
@@ -100,7 +102,7 @@ def run(events: Iterable[Event], tracker: Steps, clock: Clock, outlets: Outlets)
 def close(clock: Clock, outlets: Outlets) -> None:
     """Close links and log in order, after a run however it ended; what the links still sent is logged."""
     last = outlets.links.close()
-    _enter(None, Step(outlets.monitor.state), last, clock.now_ns(), outlets)
+    _enter(None, Step(outlets.monitor.state), last, clock.now_ns(), outlets, last=True)
     if outlets.recorder is not None:
         outlets.recorder.close()
     if outlets.telemetry is not None:
@@ -116,11 +118,13 @@ def _deliver(event: Event | None, step: Step, clock: Clock, outlets: Outlets) ->
         outlets.status.show(now_ns, lambda: _reading(outlets))
 
 
-def _enter(event: Event | None, step: Step, sent: tuple[Sent, ...], now_ns: int, outlets: Outlets) -> None:
+def _enter(
+    event: Event | None, step: Step, sent: tuple[Sent, ...], now_ns: int, outlets: Outlets, *, last: bool = False
+) -> None:
     """Enter one turn into the figures and the log."""
     outlets.monitor.take(event, step, sent)
     if outlets.recorder is not None:
-        outlets.recorder.take(event, step, sent, now_ns)
+        outlets.recorder.take(event, step, sent, now_ns, outlets.hearer.take(outlets.links, now_ns, last=last))
     if outlets.telemetry is not None:
         outlets.telemetry.take(event, step, sent, now_ns, outlets.surroundings)
 

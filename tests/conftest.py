@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
+import importlib.util
 import os
 from pathlib import Path
-from typing import NoReturn
+from typing import Any, NoReturn
 
 import pytest
 
@@ -38,6 +40,22 @@ def full_disk() -> Path:
     if not device.is_char_device():
         _lacking(f"this system has no {device}")
     return device
+
+
+@pytest.fixture(scope="session")
+def mavproxy() -> None:
+    """See that MAVProxy is there; without it a test fails in CI and skips on a user's machine."""
+    if importlib.util.find_spec("MAVProxy") is None:
+        _lacking("MAVProxy is not installed; `make venv` does that")
+
+
+@pytest.fixture(scope="session")
+def mavsdk() -> Any:
+    """Return the module of MAVSDK; without it a test fails in CI and skips on a user's machine."""
+    try:
+        return importlib.import_module("mavsdk")
+    except (ImportError, OSError) as error:
+        _lacking(f"MAVSDK is not installed ({error}); `make venv` does that")
 
 
 @pytest.fixture(scope="session")

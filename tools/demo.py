@@ -203,7 +203,7 @@ def _until_landed(source: SimSource, world: World) -> Iterator[Event]:
 
 def _outlet(settings: Settings, world: World, clocks: Clocks) -> Outlet:
     """Open the one link: to the simulated autopilot, in place of those the config names."""
-    ((_, terms),) = terms_of(settings.with_links(("demo",)))
+    ((_, terms),) = terms_of(settings.with_links(("demo",)), logged=True)
     return open_outlet(
         [(f"udpout:127.0.0.1:{world.autopilot.port}", replace(terms, max_age_ns=_PATIENCE_NS))],
         component_id=settings.mavlink.component_id,

@@ -38,6 +38,7 @@ from tracker.pipeline import Tracker
 from tracker.rig import Rig
 from tracker.types import Event
 
+TLOG = ".tlog"
 LOGGED_PACKAGES = ("posebridge", "numpy", "opencv-python-headless", "filterpy", "pymavlink", "scipy", "mcap")
 
 
@@ -56,7 +57,7 @@ def run_session(request: RunRequest, clocks: Clocks) -> None:
         stack.enter_context(opened.source)
         for warning in opened.warnings:
             console.print(f"posebridge: warning: {warning}", style="yellow", soft_wrap=True, highlight=False)
-        outlet = links_of(request.settings, clocks)
+        outlet = links_of(request.settings, clocks, logged=request.log is not None)
         stack.callback(outlet.close)
         recorder = _recorder(request, opened, clocks)
         monitor = Monitor(tuple(camera.name for camera in opened.chosen.rig.cameras))
@@ -106,10 +107,10 @@ def tracker_of(settings: Settings, rig: Rig, clocks: Clocks) -> Steps:
     return made(rig, tuning, clocks.stopwatch)
 
 
-def links_of(settings: Settings, clocks: Clocks) -> Outlet:
-    """Open the links that the config or the command line names."""
+def links_of(settings: Settings, clocks: Clocks, *, logged: bool = False) -> Outlet:
+    """Open the links that the config or the command line names; logged: whether a log is kept of what they say."""
     return open_outlet(
-        terms_of(settings),
+        terms_of(settings, logged=logged),
         component_id=settings.mavlink.component_id,
         room_yaw_deg=settings.room.room_yaw_deg,
         stopwatch=clocks.stopwatch,
@@ -135,8 +136,22 @@ def recorder_of(
         cameras=rig.cameras,
         marker=rig.marker,
         wall_clock=clocks.wall,
+        tlog=tlog_beside(path),
         **how,
     )
+
+
+def tlog_beside(log: Path) -> Path | None:
+    """Return where the .tlog of a log goes: beside it; nowhere for a pipe or a device.
+
+    Raises:
+        OperatorError: the log itself is named so.
+    """
+    if log.exists() and not log.is_file():
+        return None
+    if log.suffix == TLOG:
+        raise OperatorError(f"log {log}: a {TLOG} is written beside the MCAP log; name it {log.with_suffix('.mcap')}")
+    return log.with_suffix(TLOG)
 
 
 def telemetry_of(source: str, settings: Settings, rig: Rig, monitor: Monitor, clocks: Clocks) -> Telemetry:

@@ -1,7 +1,8 @@
 """What is wrong with a run, in words: cause and remedy."""
 
 from bridge.alarms.readings import BallReading, CameraReading, Limits, Readings
-from bridge.alarms.rules import RULES, Level
+from bridge.alarms.rule import Level
+from bridge.alarms.rules import RULES
 from bridge.alarms.watch import Alarm, Standing, advance, standing_alarms
 
 __all__ = [

@@ -5,12 +5,11 @@ Every limit has two edges and two times, so that a figure that dances on a limit
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
-from enum import Enum, StrEnum
+from collections.abc import Iterator
 
+from bridge.alarms.link_rules import LINK_RULES
 from bridge.alarms.readings import Readings
-from bridge.dialogue import DialogueState
+from bridge.alarms.rule import Finding, Level, Rule, Verdict, above, below, when
 from tracker.types import TrackState
 
 SETTLE_S = 3.0
@@ -22,68 +21,14 @@ SILENT_MS = 500.0
 UNSEEN_S = 3.0
 BLIND_S = 5.0
 SOUGHT_S = 5.0
-HEARD_S = 10.0
 OFFSET_MS, OFFSET_SIGMAS, OFFSET_KNOWN_MS = 3.0, 4.0, 1.5
-SYNC_S = 15.0
-
-
-class Level(StrEnum):
-    """How much it matters. ALARM: do not fly, or land.  WARNING: look into it."""
-
-    ALARM = "alarm"
-    WARNING = "warning"
-
-
-class Verdict(Enum):
-    """What a reading says of a rule. BETWEEN is neither bad enough to raise the alarm nor good enough to end it."""
-
-    BAD = "bad"
-    BETWEEN = "between"
-    GOOD = "good"
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """A verdict on one subject (a camera, a link, "" for the run), with its words for an alarm."""
-
-    subject: str
-    verdict: Verdict
-    cause: str
-    remedy: str
-
-
-@dataclass(frozen=True, slots=True)
-class Rule:
-    """One alarm. raise_s, clear_s: how long a verdict must last to raise it, and to end it [s]."""
-
-    name: str
-    level: Level
-    raise_s: float
-    clear_s: float
-    judge: Callable[[Readings], Iterable[Finding]]
-
-
-def _above(value: float | None, bad: float, good: float) -> Verdict:
-    """Judge a value that should be small: bad above one limit, good again below another."""
-    if value is None or value <= good:
-        return Verdict.GOOD
-    return Verdict.BAD if value > bad else Verdict.BETWEEN
-
-
-def _below(value: float | None, bad: float, good: float) -> Verdict:
-    """Judge a value that should be large."""
-    return _above(None if value is None else -value, -bad, -good)
-
-
-def _when(bad: bool) -> Verdict:
-    return Verdict.BAD if bad else Verdict.GOOD
 
 
 def _track_lost(now: Readings) -> Iterator[Finding]:
     why = f"; last left out: {now.last_rejection}" if now.last_rejection else ""
     yield Finding(
         "",
-        _when(now.state is TrackState.LOST),
+        when(now.state is TrackState.LOST),
         f"track lost for {now.state_s:.1f} s: nothing is sent{why}",
         "land or fly by hand; bring every ball into the view of two cameras",
     )
@@ -93,7 +38,7 @@ def _marker_not_found(now: Readings) -> Iterator[Finding]:
     why = f"; last: {now.last_rejection}" if now.last_rejection else ""
     yield Finding(
         "",
-        _when(now.state is TrackState.SEARCHING and now.running_s > SOUGHT_S),
+        when(now.state is TrackState.SEARCHING and now.running_s > SOUGHT_S),
         f"marker not found in {now.running_s:.0f} s{why}",
         "run `posebridge colours`; check light, lens caps, calibration and that all balls are in two images",
     )
@@ -102,7 +47,7 @@ def _marker_not_found(now: Readings) -> Iterator[Finding]:
 def _rate(now: Readings) -> Iterator[Finding]:
     need_hz = now.limits.rate_min_hz
     steady = now.state is TrackState.TRACKING and now.state_s > SETTLE_S
-    verdict = _below(now.rate_hz, RATE_SLACK * need_hz, RATE_BACK * need_hz) if steady else Verdict.GOOD
+    verdict = below(now.rate_hz, RATE_SLACK * need_hz, RATE_BACK * need_hz) if steady else Verdict.GOOD
     yield Finding(
         "",
         verdict,
@@ -114,7 +59,7 @@ def _rate(now: Readings) -> Iterator[Finding]:
 def _gap_severe(now: Readings) -> Iterator[Finding]:
     yield Finding(
         "",
-        _above(now.gap_ms, GAP_SEVERE_MS, GAP_SEVERE_MS),
+        above(now.gap_ms, GAP_SEVERE_MS, GAP_SEVERE_MS),
         f"a gap of {now.gap_ms or 0:.0f} ms between poses; ArduPilot gives vision up after {GAP_SEVERE_MS:.0f} ms",
         "find what covers the balls, stops a camera or holds this computer up",
     )
@@ -123,7 +68,7 @@ def _gap_severe(now: Readings) -> Iterator[Finding]:
 def _gap(now: Readings) -> Iterator[Finding]:
     yield Finding(
         "",
-        _above(now.gap_ms, GAP_MS, GAP_MS),
+        above(now.gap_ms, GAP_MS, GAP_MS),
         f"a gap of {now.gap_ms or 0:.0f} ms between poses, limit {GAP_MS:.0f} ms",
         "look at what was left out and at the frames of each camera",
     )
@@ -133,7 +78,7 @@ def _latency(now: Readings) -> Iterator[Finding]:
     limit_ms = now.limits.latency_limit_ms
     yield Finding(
         "",
-        _above(now.latency_p99_ms, limit_ms, 0.9 * limit_ms),
+        above(now.latency_p99_ms, limit_ms, 0.9 * limit_ms),
         f"latency p99 {now.latency_p99_ms or 0:.0f} ms, limit {limit_ms:g} ms",
         "stop other programs on this computer, or track fewer or smaller images",
     )
@@ -143,7 +88,7 @@ def _age(now: Readings) -> Iterator[Finding]:
     limit_ms = now.limits.max_age_ms
     yield Finding(
         "",
-        _above(now.age_ms, limit_ms, 0.8 * limit_ms),
+        above(now.age_ms, limit_ms, 0.8 * limit_ms),
         f"poses are {now.age_ms or 0:.0f} ms old when they could leave, limit {limit_ms:g} ms: those are not sent",
         "this computer falls behind its cameras: lower their frame rate, or check their latency_ms",
     )
@@ -152,7 +97,7 @@ def _age(now: Readings) -> Iterator[Finding]:
 def _nis_high(now: Readings) -> Iterator[Finding]:
     yield Finding(
         "",
-        _above(now.nis_ratio, NIS_HIGH, 0.9 * NIS_HIGH),
+        above(now.nis_ratio, NIS_HIGH, 0.9 * NIS_HIGH),
         f"NIS {now.nis_ratio or 0:.2f} times its expectation, limit {NIS_HIGH:g}: the images disagree with the model",
         "calibrate the cameras anew, check the balls' positions in the config and the cameras' clocks",
     )
@@ -161,7 +106,7 @@ def _nis_high(now: Readings) -> Iterator[Finding]:
 def _nis_low(now: Readings) -> Iterator[Finding]:
     yield Finding(
         "",
-        _below(now.nis_ratio, NIS_LOW, 1.1 * NIS_LOW),
+        below(now.nis_ratio, NIS_LOW, 1.1 * NIS_LOW),
         f"NIS {now.nis_ratio or 0:.2f} times its expectation, limit {NIS_LOW:g}: the filter is too cautious",
         "lessen pixel_noise_px or [tracker.process] in the config",
     )
@@ -171,7 +116,7 @@ def _camera_silent(now: Readings) -> Iterator[Finding]:
     for camera in now.cameras:
         yield Finding(
             camera.name,
-            _above(camera.silent_ms, SILENT_MS, SILENT_MS / 2),
+            above(camera.silent_ms, SILENT_MS, SILENT_MS / 2),
             f"{camera.name} has given no frame for {camera.silent_ms / 1e3:.1f} s",
             "check its cable, power and USB bus; it is taken back by itself",
         )
@@ -181,7 +126,7 @@ def _camera_blind(now: Readings) -> Iterator[Finding]:
     for camera in now.cameras:
         yield Finding(
             camera.name,
-            _above(camera.blind_s, BLIND_S, 1.0),
+            above(camera.blind_s, BLIND_S, 1.0),
             f"{camera.name} gives frames, but no ball in them was used for {camera.blind_s:.0f} s",
             "look through it (`posebridge colours --picture`): lens, light, focus, or it was moved",
         )
@@ -191,7 +136,7 @@ def _ball_unseen(now: Readings) -> Iterator[Finding]:
     for ball in now.balls:
         yield Finding(
             ball.name,
-            _above(ball.unseen_s, UNSEEN_S, 1.0),
+            above(ball.unseen_s, UNSEEN_S, 1.0),
             f"no camera has seen the {ball.name} ball for {ball.unseen_s:.0f} s",
             "check its paint and light, and learn the colours anew (`posebridge colours`)",
         )
@@ -203,28 +148,16 @@ def _clock_offset(now: Readings) -> Iterator[Finding]:
         known = sigma_ms is not None and sigma_ms < OFFSET_KNOWN_MS and abs(found_ms) > OFFSET_SIGMAS * sigma_ms
         yield Finding(
             camera.name,
-            _above(abs(found_ms), OFFSET_MS, 0.7 * OFFSET_MS) if known else Verdict.GOOD,
+            above(abs(found_ms), OFFSET_MS, 0.7 * OFFSET_MS) if known else Verdict.GOOD,
             f"{camera.name} sees {found_ms:+.1f} ms later than its stamps say (sigma {sigma_ms or 0:.1f} ms)",
             f"set clock_offset_ms = {camera.configured_offset_ms + found_ms:.1f} for {camera.name} in the config",
-        )
-
-
-def _link_down(now: Readings) -> Iterator[Finding]:
-    for link in now.around.links:
-        yield Finding(
-            link.name,
-            _when(not link.up),
-            f"link {link.name} is down: {link.reason}",
-            "check that the autopilot has power, the cable, port and baud; it is tried again by itself",
         )
 
 
 def _log_stopped(now: Readings) -> Iterator[Finding]:
     log = now.around.log
     if log is not None:
-        yield Finding(
-            "", _when(bool(log.error)), log.error, "free space on the disk and start anew; the flight goes on"
-        )
+        yield Finding("", when(bool(log.error)), log.error, "free space on the disk and start anew; the flight goes on")
 
 
 def _log_dropping(now: Readings) -> Iterator[Finding]:
@@ -232,65 +165,9 @@ def _log_dropping(now: Readings) -> Iterator[Finding]:
     if log is not None and not log.error:
         yield Finding(
             "",
-            _when(log.dropped > 0),
+            when(log.dropped > 0),
             f"the log lacks {log.dropped} steps: the disk is slower than the flight",
             "log to a faster disk",
-        )
-
-
-def _far_ends(now: Readings) -> Iterator[tuple[str, DialogueState]]:
-    """Yield each link's URI and what is known of its far end."""
-    for link, far in zip(now.around.links, now.around.far_ends, strict=False):
-        yield link.name, far
-
-
-def _autopilot_silent(now: Readings) -> Iterator[Finding]:
-    for link, far in _far_ends(now):
-        yield Finding(
-            link,
-            _when(far.away),
-            f"the autopilot on {link} has fallen silent",
-            "check its power and the wire back from it; it is taken back by itself",
-        )
-
-
-def _yaw_wrong(now: Readings) -> Iterator[Finding]:
-    for link, far in _far_ends(now):
-        yield Finding(
-            link,
-            _when(bool(far.yaw)),
-            far.yaw,
-            "take over by hand and land; then see marker and room_yaw_deg by `posebridge check --frame`",
-        )
-
-
-def _poses_held(now: Readings) -> Iterator[Finding]:
-    for link, far in _far_ends(now):
-        yield Finding(
-            link,
-            _when(bool(far.holding)),
-            f"no poses go to {link}: {far.holding}",
-            "wait for its EKF; if it stays so, see the origin in docs/autopilots.md",
-        )
-
-
-def _autopilot_unheard(now: Readings) -> Iterator[Finding]:
-    for link, far in _far_ends(now):
-        yield Finding(
-            link,
-            _when(far.peer is None and now.running_s > HEARD_S),
-            f"no autopilot heard on {link} in {now.running_s:.0f} s: poses go out, nobody says that they arrive",
-            "connect both wires; give the port MAVLink 2 (ArduPilot: SERIALn_PROTOCOL 2) and the right baud",
-        )
-
-
-def _time_sync(now: Readings) -> Iterator[Finding]:
-    for link, far in _far_ends(now):
-        yield Finding(
-            link,
-            _when(far.peer is not None and not far.away and far.sync is None and now.running_s > SYNC_S),
-            f"no TIMESYNC reply on {link} was quick enough to use: the autopilot's clock is not known",
-            "check that the round trip is under 10 ms: a faster baud, or fewer other streams on this port",
         )
 
 
@@ -310,12 +187,7 @@ RULES = (
     Rule("camera_blind", Level.WARNING, 0.0, 1.0, _camera_blind),
     Rule("ball_unseen", Level.WARNING, 0.0, 1.0, _ball_unseen),
     Rule("clock_offset", Level.WARNING, 2.0, 2.0, _clock_offset),
-    Rule("link_down", Level.ALARM, 0.5, 1.0, _link_down),
-    Rule("autopilot_silent", Level.ALARM, 0.0, 0.0, _autopilot_silent),
-    Rule("yaw_wrong", Level.ALARM, 0.0, 2.0, _yaw_wrong),
-    Rule("poses_held", Level.ALARM, 3.0, 0.0, _poses_held),
-    Rule("autopilot_unheard", Level.WARNING, 0.0, 0.0, _autopilot_unheard),
+    *LINK_RULES,
     Rule("log_stopped", Level.WARNING, 0.0, 0.0, _log_stopped),
     Rule("log_dropping", Level.WARNING, 0.0, 0.0, _log_dropping),
-    Rule("time_sync", Level.WARNING, 0.0, 1.0, _time_sync),
 )

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 from bridge.alarms.readings import Readings
-from bridge.alarms.rules import GAP_RULE, GAP_SEVERE_RULE, RULES, Finding, Level, Rule, Verdict
+from bridge.alarms.rule import Finding, Level, Rule, Verdict
+from bridge.alarms.rules import GAP_RULE, GAP_SEVERE_RULE, RULES
 
 SHADOWED = {GAP_RULE.name: GAP_SEVERE_RULE.name}
 

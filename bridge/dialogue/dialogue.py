@@ -14,6 +14,7 @@ from bridge.dialogue.news import Facts, News, Saturation
 from bridge.dialogue.origin import Origin, OriginKeeper
 from bridge.dialogue.peer import Peer, PeerWatch
 from bridge.dialogue.profile import AUTO, Profile, kept_apart, profile_for
+from bridge.dialogue.streams import NOTHING, StreamKeeper, Wanted
 from bridge.dialogue.timesync import TIMESYNC, SyncState, TimeSync
 from bridge.pack import heartbeat
 from bridge.wire import Message, Received
@@ -29,7 +30,7 @@ class Terms:
 
     profile: a profile's name, or auto.  messages: names that replace the profile's; None for the profile's own.
     vehicle_id: the vehicle's system id, None for the first autopilot heard.  origin: to be told, None for none.
-    max_age_ns: an estimate older than this is not sent [ns].
+    max_age_ns: an estimate older than this is not sent [ns].  streams: what the autopilot is to tell of itself.
     """
 
     profile: str = AUTO
@@ -37,6 +38,7 @@ class Terms:
     vehicle_id: int | None = None
     origin: Origin | None = None
     max_age_ns: int = 100_000_000
+    streams: Wanted = NOTHING
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +51,7 @@ class DialogueState:
     too_old, too_close: estimates not sent for their age, or because they followed the last one too closely.
     yaw: what is wrong with our yaw against the vehicle's motion, "" for nothing.
     strangers: messages of others than the autopilot.  unsigned: messages refused for want of a right signature.
+    full: whether the link takes less than it is given.  streams: what the autopilot was asked to tell, "" for nothing.
     """
 
     peer: Peer | None
@@ -62,13 +65,16 @@ class DialogueState:
     strangers: int
     unsigned: int = 0
     yaw: str = ""
+    full: bool = False
+    streams: str = ""
 
     @property
     def brief(self) -> str:
         """The far end in a word or two: the autopilot, whether it is silent, why it gets no poses."""
         who = "" if self.peer is None else str(self.peer.autopilot) + (" SILENT" if self.away else "")
         holding = f"NO POSES, {self.holding}" if self.holding else ""
-        return ", ".join(word for word in (who, holding, "YAW WRONG" if self.yaw else "") if word)
+        full = "LINK FULL" if self.full else ""
+        return ", ".join(word for word in (who, holding, full, "YAW WRONG" if self.yaw else "") if word)
 
     def __str__(self) -> str:
         """The far end in a line."""
@@ -88,6 +94,10 @@ class DialogueState:
             settled = "" if self.sync.converged else ", settling"
             yield f"clock {self.sync.offset_ns / 1e6:+.1f} +- {self.sync.spread_ms:.1f} ms{settled}"
             yield f"round trip {self.sync.rtt_ms:.1f} ms"
+        if self.full:
+            yield "LINK FULL: only the newest poses go, at the rate that fits"
+        if self.streams:
+            yield f"its streams: {self.streams}"
         counts = (
             (self.too_old, "too old"),
             (self.too_close, "too close"),
@@ -106,6 +116,7 @@ class Dialogue:
         self._sync = TimeSync()
         self._origin = OriginKeeper(terms.origin)
         self._heading = HeadingWatch()
+        self._streams = StreamKeeper(terms.streams)
         self._news = News()
         self._saturation = Saturation()
         self._late = False
@@ -137,12 +148,14 @@ class Dialogue:
                 continue
             self._heard_ns = message.arrived_ns
             self._origin.take(message)
+            self._streams.take(message)
             if message.message == ATTITUDE:
                 self._heading.take(message)
             if message.message == TIMESYNC and message.whole("tc1") != 0:
                 self._sync.take(message)
                 if self._sync.rebooted:
                     self._origin.start_anew()
+                    self._streams.start_anew()
 
     def due(self, track: TrackState, now_ns: int, superseded: int = 0) -> list[Message]:
         """Return the messages besides poses that are due at stream time now_ns [ns].
@@ -161,9 +174,11 @@ class Dialogue:
             messages.append(request)
         if self.profile.needs_origin or self._terms.origin is not None:
             messages += self._origin.due(self.peer, now_ns)
-        attitude = self._heading.due(self.peer, now_ns)
-        if attitude is not None:
-            messages.append(attitude)
+        asked = self._streams.due(self.peer, now_ns)
+        if asked is None and self._streams.settled:
+            asked = self._heading.due(self.peer, now_ns)
+        if asked is not None:
+            messages.append(asked)
         return messages + self._news.due(self._facts(track, now_ns), now_ns)
 
     def admits(self, estimate: Estimate, now_ns: int) -> bool:
@@ -190,6 +205,7 @@ class Dialogue:
         return DialogueState(
             self.peer, self._is_away(now_ns), self.profile.name, self._sync.state(), origin, self._holding(),
             self._too_old, self._too_close, self._watch.strangers, yaw=self._heading.reading.alarm,
+            full=self._saturation.now, streams=str(self._streams),
         )  # fmt: skip
 
     def _holding(self) -> str:

@@ -21,6 +21,7 @@ JUMP_NS, JUMPS_IN_A_ROW = 100_000_000, 5
 REBOOT_NS = 1_000_000_000
 ASK_QUICKLY_NS, ASK_NS = 20_000_000, 200_000_000
 WINDOW = 100
+IN_VAIN = 10  # so many questions without a usable answer, and asking quickly only fills the line
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,15 +78,20 @@ class TimeSync:
         self._skew = 0.0
         self._at_ns = 0
         self._far_ns: int | None = None
-        self._samples = self._refused = self._restarts = self._jumps = 0
+        self._samples = self._refused = self._restarts = self._jumps = self._in_vain = 0
         self.rebooted = False
         """Whether the newest reply's clock stood before the one before it: its owner started anew."""
 
     def request(self, now_ns: int) -> Message | None:
-        """Return the request that is due now, quickly one after the other until the estimate has converged."""
+        """Return the request that is due now, quickly one after the other until the estimate has converged.
+
+        Where answers are too slow to be used, as at 57600 baud, or do not come, quick questions are but a burden.
+        """
         if self._due_ns is not None and now_ns < self._due_ns:
             return None
-        self._due_ns = now_ns + (ASK_NS if self._samples >= CONVERGED_SAMPLES else ASK_QUICKLY_NS)
+        quickly = self._samples < CONVERGED_SAMPLES and self._in_vain < IN_VAIN
+        self._due_ns = now_ns + (ASK_QUICKLY_NS if quickly else ASK_NS)
+        self._in_vain += 1
         self._asked.append(now_ns)
         return make_message(TIMESYNC, now_ns, tc1=0, ts1=now_ns)
 
@@ -102,6 +108,7 @@ class TimeSync:
         if not 0 <= rtt_ns < RTT_LIMIT_NS:
             self._refused += 1
             return
+        self._in_vain = 0
         self._rtts_ns.append(rtt_ns)
         self._follow((sent_ns + reply.arrived_ns) / 2 - far_ns, reply.arrived_ns)
 

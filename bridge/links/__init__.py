@@ -12,10 +12,10 @@ from bridge.links.memory import MemoryLink
 from bridge.links.serial import open_serial
 from bridge.links.tcp import open_tcp
 from bridge.links.udp import UdpInLink, UdpOutLink
-from bridge.links.uri import FORMS, Address, parse
+from bridge.links.uri import FORMS, Address, line_bytes_s, parse
 from bridge.wire import LinkState, Message, Sent
 
-__all__ = ["FORMS", "Encode", "Link", "MemoryLink", "open_link", "parse"]
+__all__ = ["FORMS", "Encode", "Link", "MemoryLink", "line_bytes_s", "open_link", "parse"]
 
 
 class Link(Protocol):

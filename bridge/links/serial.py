@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import math
 import termios
 
 import serial
 from serial.tools import list_ports
 
+from bridge.clock import Nanoseconds
 from bridge.links.ledger import Ledger
 from bridge.links.stream import StreamLink
-from bridge.links.uri import Address
+from bridge.links.uri import BITS_PER_BYTE, Address
 from tracker.errors import OperatorError
 
-_BITS_PER_BYTE = 10  # a start bit, eight data bits, a stop bit
 _WRITE_TIMEOUT_S = 0.5
 _MIN_POLL_S = 0.001
 
@@ -22,13 +23,20 @@ _MIN_POLL_S = 0.001
 class SerialPort:
     """One open serial port, 8N1 without flow control, locked against other programs. Every failure is an OSError.
 
-    device: path.  baud: bits a second.
+    What lies between us and the wire is counted twice: by the kernel, and by what a line of this baud can have carried
+    since it was written. USB adapters and pseudo-terminals take kilobytes into buffers of their own and report nothing:
+    without the second count seconds of old poses would wait there.
+
+    device: path.  baud: bits a second.  stopwatch: reads a running time [ns].
     """
 
     low_water_bytes = 16
 
-    def __init__(self, device: str, baud: int) -> None:
-        self.poll_s = max(_MIN_POLL_S, self.low_water_bytes * _BITS_PER_BYTE / baud)
+    def __init__(self, device: str, baud: int, stopwatch: Nanoseconds) -> None:
+        self.poll_s = max(_MIN_POLL_S, self.low_water_bytes * BITS_PER_BYTE / baud)
+        self._byte_ns = 1e9 * BITS_PER_BYTE / baud
+        self._stopwatch = stopwatch
+        self._carried_ns = 0.0  # when the line will have carried all that was written
         try:
             self._serial = serial.Serial(device, baud, timeout=0, write_timeout=_WRITE_TIMEOUT_S, exclusive=True)
         except (ValueError, OverflowError, termios.error) as error:
@@ -41,14 +49,16 @@ class SerialPort:
     def write(self, data: bytes) -> None:
         """Hand all of `data` to the kernel within half a second."""
         self._serial.write(data)
+        self._carried_ns = max(self._carried_ns, self._stopwatch()) + len(data) * self._byte_ns
 
     def read(self) -> bytes:
         """Return what came in; pyserial raises when the device is gone."""
         return bytes(self._serial.read(max(1, self._serial.in_waiting)))
 
     def pending(self) -> int:
-        """Return how many bytes the kernel still holds."""
-        return int(self._serial.out_waiting)
+        """Return how many bytes have not left yet."""
+        on_the_way = math.ceil((self._carried_ns - self._stopwatch()) / self._byte_ns)
+        return max(int(self._serial.out_waiting), on_the_way)
 
     def close(self) -> None:
         """Close the port."""
@@ -70,7 +80,7 @@ def open_serial(address: Address, ledger: Ledger) -> StreamLink:
     """
 
     def open_port() -> SerialPort:
-        return SerialPort(address.place, address.number)
+        return SerialPort(address.place, address.number, ledger.now_ns)
 
     try:
         return StreamLink(open_port(), open_port, ledger)

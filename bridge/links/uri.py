@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from tracker.errors import OperatorError
 
+BITS_PER_BYTE = 10  # on a serial line: a start bit, eight data bits, a stop bit
 FORMS = "udpout:HOST:PORT, udpin:HOST:PORT, serial:DEVICE:BAUD, tcp:HOST:PORT"
 _NUMBERED = ("udpout", "udpin", "serial", "tcp")
 
@@ -38,6 +39,13 @@ def parse(uri: str) -> Address:
     if scheme != "serial" and not 1 <= number <= 65535:
         raise OperatorError(f"link {uri}: port {number} must be 1 to 65535; 14550 is the usual UDP port")
     return Address(uri, scheme, place.strip("[]") if scheme != "serial" else place, number)
+
+
+def line_bytes_s(uri: str) -> float | None:
+    """Return what a link's line carries each way by its URI [B/s]; None where that is no limit, or not known."""
+    scheme, _, rest = uri.partition(":")
+    baud = _whole_number(rest.rpartition(":")[2])
+    return None if scheme != "serial" or baud is None or baud <= 0 else baud / BITS_PER_BYTE
 
 
 def _whole_number(digits: str) -> int | None:

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import orjson
 
+from bridge.heard import NOTHING, Heard
 from bridge.log import triangle
 from bridge.wire import Sent
 from tracker import so3
@@ -24,7 +25,7 @@ class FrameTime(NamedTuple):
 
 
 class Entry(NamedTuple):
-    """One step and what was sent for it.
+    """One step, what was sent for it, and what was heard meanwhile.
 
     now_ns: stream time when it was taken [ns].  wall_ns: the wall clock then, where one is due [ns].
     """
@@ -35,15 +36,23 @@ class Entry(NamedTuple):
     rejections: tuple[Rejected, ...]
     step: Step
     sent: tuple[Sent, ...]
+    heard: Heard = NOTHING
 
 
-def make_entry(event: Event | None, step: Step, sent: tuple[Sent, ...], now_ns: int, wall_ns: int | None) -> Entry:
+def make_entry(
+    event: Event | None,
+    step: Step,
+    sent: tuple[Sent, ...],
+    now_ns: int,
+    wall_ns: int | None,
+    heard: Heard = NOTHING,
+) -> Entry:
     """Keep what the log needs of one turn of the loop."""
     frame = FrameTime(event.camera, event.t_ns, event.available_ns) if isinstance(event, Frame) else None
     rejections = step.rejections
     if isinstance(event, Rejected) and event not in rejections:
         rejections = (event, *rejections)
-    return Entry(now_ns, wall_ns, frame, rejections, step, sent)
+    return Entry(now_ns, wall_ns, frame, rejections, step, sent, heard)
 
 
 def encode(value: Value) -> bytes:

@@ -96,8 +96,13 @@ def sent_topic(message: str, fields: Mapping[str, FieldValue]) -> Topic:
         available_ns=integer("stopwatch reading when the newest frame behind it stood in memory, 0 for none [ns]"),
         latency_ns=integer("sent_ns - available_ns; -1 where no frame is behind it [ns]"),
         raw={"type": "string", "contentEncoding": "base64", "description": "the whole MAVLink 2 frame"},
-        fields={"type": "object", "properties": {name: _field(value) for name, value in fields.items()}},
+        fields=fields_schema(fields),
     )
+
+
+def fields_schema(fields: Mapping[str, FieldValue]) -> Schema:
+    """Describe a MAVLink message's fields by those of one such message."""
+    return {"type": "object", "properties": {name: _field(value) for name, value in fields.items()}}
 
 
 def _field(value: FieldValue) -> Schema:

@@ -10,26 +10,29 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from bridge.log import topics, triangle
+from bridge.heard import NOTHING, Heard
+from bridge.log import received, topics, triangle
 from bridge.log.reader import LogReader, Record
 from bridge.wire import Sent
 from tracker.types import Array, BallSighting, Estimate, Event, Frame, Reason, Rejected, Step, TrackState, frozen_array
 
 _NO_IMAGE = np.zeros((0, 0, 3), np.uint8)
-_TOPICS = frozenset(
-    {t.name for t in (topics.SIGHTINGS, topics.REJECTIONS, topics.ESTIMATE, topics.LATENCY, topics.LOG)}
-)
+_FAR_TOPICS = frozenset({t.name for t in (received.TIMESYNC, received.AUTOPILOT, received.LINK)})
+_TOPICS = _FAR_TOPICS | {
+    t.name for t in (topics.SIGHTINGS, topics.REJECTIONS, topics.ESTIMATE, topics.LATENCY, topics.LOG)
+}
 _STATES = {state.value: state for state in TrackState}
 _REASONS = {reason.value: reason for reason in Reason}
 
 
 class LoggedTurn(NamedTuple):
-    """One record as a turn of the loop. now_ns: stream time when it was taken [ns]."""
+    """One record as a turn of the loop. now_ns: stream time when it was taken [ns].  heard: without what came in."""
 
     event: Event | None
     step: Step
     sent: tuple[Sent, ...]
     now_ns: int
+    heard: Heard = NOTHING
 
 
 def turns(reader: LogReader) -> Iterator[LoggedTurn]:
@@ -53,6 +56,8 @@ def turns(reader: LogReader) -> Iterator[LoggedTurn]:
                 state = estimate.state
                 yield LoggedTurn(None, Step(state, estimates=(estimate,)), (), now_ns)
             waiting = None
+        elif record.topic in _FAR_TOPICS:
+            yield LoggedTurn(None, Step(state), (), now_ns, _heard(record))
         else:
             yield LoggedTurn(None, Step(state), (_sent(record),), now_ns)
 
@@ -62,6 +67,15 @@ class _Wanted:
 
     def __contains__(self, topic: object) -> bool:
         return topic in _TOPICS or (isinstance(topic, str) and topic.startswith(topics.SENT_PREFIX))
+
+
+def _heard(record: Record) -> Heard:
+    value = record.value
+    if record.topic == received.TIMESYNC.name:
+        return Heard(clocks=((value["link"], received.clock_of(value)),))
+    if record.topic == received.AUTOPILOT.name:
+        return Heard(far_ends=((value["link"], received.autopilot_of(value)),))
+    return Heard(links=(received.link_of(value),))
 
 
 def _new_state(record: Record, state: TrackState) -> TrackState:

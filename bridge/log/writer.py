@@ -15,6 +15,7 @@ from bridge.log import entry as values
 from bridge.log import scene, topics, vehicle
 from bridge.log.container import Container
 from bridge.log.entry import Entry, encode
+from bridge.log.received import HeardWriter
 from bridge.wire import Sent
 from tracker.camera import Camera
 from tracker.rig import Marker
@@ -77,6 +78,7 @@ class LogWriter:
         self._channels: dict[str, Channel] = {}
         self._state: TrackState | None = None
         self._reset_counter: int | None = None
+        self._heard = HeardWriter(self._json)
         self._begin()
 
     def write(self, entry: Entry) -> None:
@@ -95,6 +97,7 @@ class LogWriter:
             self._write_estimate(estimate, entry.sent, now_ns)
         for sent in entry.sent:
             self._write_sent(sent, now_ns)
+        self._heard.write(entry.heard, now_ns)
         self._write_changes(entry)
 
     def warn(self, now_ns: int, message: str) -> None:

@@ -137,12 +137,13 @@ class TrackerSettings(Section):
 
 
 class MavlinkSettings(Section):
-    """Who the bridge is on MAVLink, what kind of autopilot it talks to, and how old a pose may get."""
+    """Who the bridge is on MAVLink, what kind of autopilot it talks to, how old a pose may get, what a log asks for."""
 
     system_id: Annotated[int, Strict(), Field(ge=1, le=254)] | None = None
     component_id: Annotated[int, Strict(), Field(ge=1, le=255)] = 197
     profile: Literal["auto", "ardupilot", "px4", "generic"] = "auto"
     max_age_ms: Positive = 100.0
+    streams_hz: Annotated[float, Strict(), Field(ge=0, le=400)] = 50.0
     signing_key: str = ""
 
 

@@ -13,11 +13,11 @@ from bridge.log.reader import LogReader
 from bridge.log.turns import turns
 from bridge.log.writer import CALIBRATION_ATTACHMENT
 from bridge.monitor import Monitor
+from bridge.telemetry.far_side import FarSide
 from bridge.telemetry.gauges import Names
 from bridge.telemetry.snapshot import About, Snapshot
 from bridge.telemetry.states import LogState, Surroundings
 from bridge.telemetry.telemetry import WATCH_NS, Telemetry
-from bridge.wire import LinkState, Sent
 from tracker.errors import OperatorError
 
 CONFIG_ATTACHMENT = "config.json"
@@ -56,13 +56,12 @@ class LoggedRun:
         """
         monitor = Monitor(self._names.cameras)
         telemetry = Telemetry(self._about, self._names, self._limits, monitor, None, lambda: 0)
-        links: dict[str, int] = {}
+        far = FarSide()
         due_ns: int | None = None
         before_ns: int | None = None
 
         def around() -> Surroundings:
-            states = (LinkState(name, True, "", count, 0, 0) for name, count in links.items())
-            return Surroundings(tuple(states), self._log)
+            return Surroundings(far.links(), self._log, far.far_ends())
 
         for turn in turns(self._reader):
             before_ns = turn.now_ns if before_ns is None else before_ns
@@ -74,7 +73,7 @@ class LoggedRun:
                 due_ns = None
             if every_ns is not None and due_ns is None:
                 due_ns = turn.now_ns + every_ns
-            _count(turn.sent, links)
+            far.take(turn)
             monitor.take(turn.event, turn.step, turn.sent)
             telemetry.take(turn.event, turn.step, turn.sent, turn.now_ns, around)
         yield telemetry.snapshot(around)
@@ -84,11 +83,6 @@ def _steps(before_ns: int, now_ns: int) -> range:
     """Return the times between two records at which a running bridge would have looked at its alarms."""
     start_ns = max(before_ns, now_ns - LONGEST_SILENCE_NS)
     return range(start_ns + WATCH_NS, now_ns, WATCH_NS)
-
-
-def _count(sent: tuple[Sent, ...], links: dict[str, int]) -> None:
-    for record in sent:
-        links[record.link] = links.get(record.link, 0) + 1
 
 
 def _names(calibration: Mapping[str, Any], config: Mapping[str, Any]) -> Names:

@@ -5,11 +5,13 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from time import perf_counter_ns
 from typing import cast
 
 import numpy as np
 import pytest
 
+from bridge.clock import Nanoseconds
 from bridge.dialogue import Terms
 from bridge.links import MemoryLink, open_link
 from bridge.outlet import Outlet, Spout, open_outlet
@@ -32,12 +34,12 @@ def terms(messages: tuple[str, ...]) -> Terms:
     return Terms(messages=messages, vehicle_id=7, max_age_ns=NO_LIMIT_NS)
 
 
-def outlet_to(links: Sequence[tuple[str, tuple[str, ...]]]) -> Outlet:
+def outlet_to(links: Sequence[tuple[str, tuple[str, ...]]], stopwatch: Nanoseconds = perf_counter_ns) -> Outlet:
     return open_outlet(
         [(uri, terms(messages)) for uri, messages in links],
         component_id=197,
         room_yaw_deg=0.0,
-        stopwatch=itertools.count(1000, 10).__next__,
+        stopwatch=stopwatch,
     )
 
 
@@ -126,7 +128,7 @@ def test_the_same_input_gives_the_same_bytes() -> None:
 
 
 def test_records_tell_what_left_when_and_of_which_frame() -> None:
-    outlet = outlet_to([("memory:", (MOCAP,))])
+    outlet = outlet_to([("memory:", (MOCAP,))], itertools.count(1000, 10).__next__)
     heartbeat, pose = outlet.send(step(estimate(t_ns=123_456, available_ns=77)), 200_000)
     assert (heartbeat.message, heartbeat.t_ns, heartbeat.available_ns) == ("HEARTBEAT", 200_000, 0)
     assert (pose.message, pose.t_ns, pose.available_ns) == (MOCAP, 123_456, 77)
@@ -140,7 +142,7 @@ def test_records_tell_what_left_when_and_of_which_frame() -> None:
 @pytest.mark.parametrize("kind", [UdpFar, UdpCaller, SerialFar, SlowSerialFar, TcpFar])
 def test_a_flight_arrives_whole_at_a_real_far_end(kind: Callable[[Path], FarEnd], tmp_path: Path) -> None:
     far = kind(tmp_path)
-    link = open_link(far.uri, Encoder(Identity(7)), itertools.count().__next__)
+    link = open_link(far.uri, Encoder(Identity(7)), perf_counter_ns)
     outlet = Outlet([Spout(link, terms((VISION, MOCAP)))], Packer(0.0))
     far.meet(link)
     arrived: list[ByHand] = []
@@ -278,7 +280,7 @@ def test_a_time_request_is_answered_at_once_though_the_loop_stands_still(
 ) -> None:
     """PX4 believes stamps only after its requests were answered within 10 ms; the loop comes by once a frame."""
     far = kind(tmp_path)
-    link = open_link(far.uri, Encoder(Identity(7)), itertools.count().__next__)
+    link = open_link(far.uri, Encoder(Identity(7)), perf_counter_ns)
     outlet = Outlet([Spout(link, terms((VISION,)))], Packer(0.0))
     far.meet(link)
     outlet.send(NOTHING, 0)

@@ -65,13 +65,14 @@ class FarEnd(ABC):
         """Be there again, at the same address."""
 
     @abstractmethod
-    def _take(self) -> bytes: ...
+    def take(self) -> bytes:
+        """Return what has come; only called once something has."""
 
     def _read(self) -> bytes:
         readable, _, _ = select.select([self.fileno()], [], [], PATIENCE_S)
         if not readable:
             raise TimeoutError("nothing came in ten seconds")
-        return self._take()
+        return self.take()
 
 
 class UdpFar(FarEnd):
@@ -99,7 +100,7 @@ class UdpFar(FarEnd):
         self.socket.bind((HOST, self._port))
         self._port = self.socket.getsockname()[1]
 
-    def _take(self) -> bytes:
+    def take(self) -> bytes:
         data, self._peer = self.socket.recvfrom(65535)
         return data
 
@@ -132,7 +133,7 @@ class UdpCaller(FarEnd):
         self.socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self.socket.connect((HOST, self._port))
 
-    def _take(self) -> bytes:
+    def take(self) -> bytes:
         return self.socket.recv(65535)
 
 
@@ -164,7 +165,7 @@ class SerialFar(FarEnd):
         tty.setraw(self._slave)
         self._device.symlink_to(os.ttyname(self._slave))
 
-    def _take(self) -> bytes:
+    def take(self) -> bytes:
         return os.read(self._master, 65536)
 
 
@@ -172,6 +173,25 @@ class SlowSerialFar(SerialFar):
     """The same at 115200 baud."""
 
     baud = 115200
+
+
+class PacedSerialFar(SerialFar):
+    """The same at 57600 baud, and read as fast as such a line carries, a quarter of a second caught up with at most."""
+
+    baud = 57600
+
+    def __init__(self, directory: Path) -> None:
+        super().__init__(directory)
+        self._read_at, self._credit = monotonic(), 0.0
+
+    def take(self) -> bytes:
+        rate = self.baud / 10
+        now = monotonic()
+        self._credit = min(self._credit + (now - self._read_at) * rate, rate / 4)
+        self._read_at = now
+        data = os.read(self._master, int(self._credit)) if self._credit >= 1.0 else b""
+        self._credit -= len(data)
+        return data
 
 
 class TcpFar(FarEnd):
@@ -185,6 +205,10 @@ class TcpFar(FarEnd):
 
     def meet(self, link: Link) -> None:
         super().meet(link)
+        self.accept()
+
+    def accept(self) -> None:
+        """Take the link's connection."""
         self._connection, _ = self._server.accept()
 
     def fileno(self) -> int:
@@ -202,7 +226,7 @@ class TcpFar(FarEnd):
         self._server.settimeout(PATIENCE_S)
         self._port = self._server.getsockname()[1]
 
-    def _take(self) -> bytes:
+    def take(self) -> bytes:
         return self._connection.recv(65536)
 
 
@@ -231,9 +255,9 @@ class MemoryFar(FarEnd):
         """Do nothing: memory does not vanish."""
 
     def _read(self) -> bytes:
-        return self._take()
+        return self.take()
 
-    def _take(self) -> bytes:
+    def take(self) -> bytes:
         return self._link.frames.popleft()
 
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import itertools
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from time import perf_counter_ns
 
 import pytest
 
@@ -22,15 +22,10 @@ def encoder() -> Encode:
     return Encoder(Identity(1))
 
 
-def ticks() -> Callable[[], int]:
-    """Return a stopwatch that reads 1, 2, 3, ..."""
-    return itertools.count(1).__next__
-
-
 @pytest.fixture(params=NOTICED + UNNOTICED, ids=lambda kind: kind.__name__)
 def ends(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Ends]:
     far: FarEnd = request.param(tmp_path)
-    link = open_link(far.uri, encoder(), ticks())
+    link = open_link(far.uri, encoder(), perf_counter_ns)
     far.meet(link)
     yield link, far
     link.close()
@@ -139,7 +134,7 @@ def test_what_waits_leaves_before_the_link_closes(ends: Ends) -> None:
 
 def test_each_link_counts_for_itself(ends: Ends) -> None:
     link, far = ends
-    other = open_link("memory:other", encoder(), ticks())
+    other = open_link("memory:other", encoder(), perf_counter_ns)
     for k in range(3):
         other.send(beat(k))
     link.send(beat(9))

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from typing import ParamSpec, TypeVar
 
 from bridge.clock import Nanoseconds
+from bridge.heard import Heard
 from bridge.links import Link
 from bridge.monitor import Monitor
 from bridge.pack import Packer
@@ -133,9 +134,9 @@ class TimedRecorder:
         self._recorder = recorder
         self._timed = stages
 
-    def take(self, event: Event | None, step: Step, sent: tuple[Sent, ...], now_ns: int) -> None:
+    def take(self, event: Event | None, step: Step, sent: tuple[Sent, ...], now_ns: int, heard: Heard) -> None:
         """Hand over one turn."""
-        self._timed.time("record", self._recorder.take, event, step, sent, now_ns)
+        self._timed.time("record", self._recorder.take, event, step, sent, now_ns, heard)
 
     def state(self) -> RecorderState:
         """Say how the recording stands."""

@@ -166,7 +166,7 @@ def _run(
     source = stack.enter_context(SimSource(rig, world, clocks.stopwatch, timing, troubles=faults.troubles))
     witness = _Witness(tracker_of(settings, rig, clocks), world, faults)
     outlet = open_outlet(
-        terms_of(settings.with_links((f"udpout:127.0.0.1:{relay.bridge_port}",))),
+        terms_of(settings.with_links((f"udpout:127.0.0.1:{relay.bridge_port}",)), logged=True),
         component_id=settings.mavlink.component_id,
         room_yaw_deg=settings.room.room_yaw_deg,
         stopwatch=clocks.stopwatch,

@@ -9,7 +9,7 @@ import pytest
 
 from bridge.alarms import RULES, Alarm, CameraReading, Level, Limits, Readings, advance, standing_alarms
 from bridge.alarms.readings import BallReading
-from bridge.alarms.rules import Rule
+from bridge.alarms.rule import Rule
 from bridge.alarms.watch import NOTHING
 from bridge.dialogue import DialogueState
 from bridge.dialogue.peer import Autopilot, Peer
@@ -60,6 +60,7 @@ FAULTS: dict[str, Readings] = {
     "ball_unseen": replace(WELL, balls=(BallReading("green", 5.0),)),
     "clock_offset": replace(WELL, cameras=(CameraReading("left", 20.0, 0.0, 8.0, 0.2, 5.0),)),
     "link_down": around(links=(replace(UP, up=False, reason="no such device"),)),
+    "link_full": around(far_end=replace(TALKING, full=True)),
     "autopilot_silent": around(far_end=replace(TALKING, away=True)),
     "poses_held": around(far_end=replace(TALKING, holding="origin: waiting for the autopilot's EKF")),
     "autopilot_unheard": around(far_end=replace(TALKING, peer=None, sync=None)),

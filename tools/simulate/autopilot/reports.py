@@ -11,6 +11,7 @@ from bridge.pack import enum, make_message
 from bridge.wire import FieldValue, Message
 from tools.simulate.autopilot.imu import Increment
 from tools.simulate.autopilot.navigation import Navigation, NavState, Origin
+from tools.simulate.control import PilotSticks
 from tools.simulate.dynamics import GRAVITY
 
 Fields = dict[str, FieldValue]
@@ -25,7 +26,10 @@ _MAX_INT16 = 32767
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Snapshot:
-    """The autopilot at one instant. now_ns: since its boot.  mode: custom_mode.  state: None without a position."""
+    """The autopilot at one instant.
+
+    now_ns: since its boot.  mode: custom_mode.  state: None without a position.  sticks: the last ones it flew by.
+    """
 
     now_ns: int
     armed: bool
@@ -33,6 +37,7 @@ class Snapshot:
     navigation: Navigation
     state: NavState | None
     increment: Increment
+    sticks: PilotSticks
 
     @property
     def now_ms(self) -> int:
@@ -130,6 +135,23 @@ def _raw_imu(now: Snapshot) -> Fields:
     return {"time_usec": now.now_ns // 1000, **_inertial(now)}
 
 
+def _servos(now: Snapshot) -> Fields:
+    """Roll, pitch, climb and yaw as pulse lengths, 1000 to 2000 us; MAVLink gives their time 32 bits."""
+    given = now.sticks
+    sticks = (given.right, given.nose_up, given.up, given.nose_right)
+    pulses: Fields = {f"servo{k}_raw": round(1500 + 500 * stick) for k, stick in enumerate(sticks, 1)}
+    return {"time_usec": now.now_ns // 1000 % 2**32, **pulses}
+
+
+def _radio(now: Snapshot) -> Fields:
+    """Nobody holds a transmitter: no channel is there."""
+    return {"time_boot_ms": now.now_ms, "rssi": 255}
+
+
+def _battery(_now: Snapshot) -> None:
+    """Without a battery monitor the message is known and never sent."""
+
+
 def _origin(now: Snapshot) -> Fields | None:
     origin = now.navigation.answered_origin
     return None if origin is None else _origin_fields(origin, now.now_ns)
@@ -162,6 +184,9 @@ _FILL: Mapping[str, Callable[[Snapshot], Fields | None]] = MappingProxyType(
         "EKF_STATUS_REPORT": _ekf_status,
         "SCALED_IMU": _scaled_imu,
         "RAW_IMU": _raw_imu,
+        "SERVO_OUTPUT_RAW": _servos,
+        "RC_CHANNELS": _radio,
+        "BATTERY_STATUS": _battery,
         "GPS_GLOBAL_ORIGIN": _origin,
         "AUTOPILOT_VERSION": _version,
     }

@@ -79,6 +79,7 @@ class Autopilot:
         self._guided = Guided()
         self._state: NavState | None = None
         self._increment = _NO_INCREMENT
+        self._given = PilotSticks()
         self._now_ns = 0
         self._heard = False
         self._ready_since_ns: int | None = None
@@ -120,7 +121,8 @@ class Autopilot:
             self.set_origin(self._origin)
         self._decide()
         self._tell()
-        return self._sticks(increment.dt_s)
+        self._given = self._sticks(increment.dt_s)
+        return self._given
 
     def reference(self) -> Reference:
         """Return what is to be flown now, moved along with the filter's own jumps."""
@@ -133,7 +135,7 @@ class Autopilot:
     def snapshot(self) -> Snapshot:
         """Return how it stands now."""
         mode = LAND if self.mode is Mode.LANDING else GUIDED
-        return Snapshot(self._now_ns, self.armed, mode, self.navigation, self._state, self._increment)
+        return Snapshot(self._now_ns, self.armed, mode, self.navigation, self._state, self._increment, self._given)
 
     def set_origin(self, origin: Origin) -> bool:
         """Set the filter's origin; say whether it was taken."""

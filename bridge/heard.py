@@ -1,0 +1,88 @@
+"""What a turn of the loop adds to the log besides its step: what came in, and how far ends, clocks and links stand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+from bridge.dialogue import DialogueState
+from bridge.dialogue.timesync import SyncState
+from bridge.outlet import Outlet
+from bridge.wire import LinkState, Received
+
+LOOK_NS = 200_000_000
+COUNTS_NS = 1_000_000_000
+"""Figures that only count are logged no oftener than this; anything else within LOOK_NS of its change."""
+
+
+class Heard(NamedTuple):
+    """What came in by each link, by its URI, and what has changed there.
+
+    clocks: time sync after each exchange that changed it.  far_ends: without their clocks.
+    """
+
+    received: tuple[tuple[str, Received], ...] = ()
+    clocks: tuple[tuple[str, SyncState], ...] = ()
+    far_ends: tuple[tuple[str, DialogueState], ...] = ()
+    links: tuple[LinkState, ...] = ()
+
+
+NOTHING = Heard()
+
+
+class Hearer:
+    """Collect it, a turn at a time."""
+
+    def __init__(self) -> None:
+        self._due_ns: int | None = None
+        self._clocks: dict[str, SyncState] = {}
+        self._far_ends: dict[str, tuple[int, DialogueState]] = {}
+        self._links: dict[str, tuple[int, LinkState]] = {}
+
+    def take(self, outlet: Outlet, now_ns: int, *, last: bool = False) -> Heard:
+        """Return what is new at stream time now_ns [ns]; last: nothing comes after this, so counts are told too."""
+        received = outlet.received()
+        due = last or self._due_ns is None or not 0 <= self._due_ns - now_ns <= LOOK_NS
+        if not due and not any(message.message == "TIMESYNC" for _, message in received):
+            return Heard(received) if received else NOTHING
+        states = outlet.link_states()
+        far_ends = {link.name: state for link, state in zip(states, outlet.far_ends(), strict=True)}
+        clocks = tuple(self._new_clocks(far_ends))
+        if not due:
+            return Heard(received, clocks)
+        self._due_ns = now_ns + LOOK_NS
+        return Heard(received, clocks, tuple(self._changed(far_ends, now_ns, last)), self._news(states, now_ns, last))
+
+    def _new_clocks(self, far_ends: dict[str, DialogueState]) -> list[tuple[str, SyncState]]:
+        new = [
+            (link, state.sync)
+            for link, state in far_ends.items()
+            if state.sync is not None and state.sync != self._clocks.get(link)
+        ]
+        self._clocks.update(new)
+        return new
+
+    def _changed(self, far_ends: dict[str, DialogueState], now_ns: int, last: bool) -> list[tuple[str, DialogueState]]:
+        changed = []
+        for link, state in far_ends.items():
+            bare = replace(state, sync=None)
+            at_ns, told = self._far_ends.get(link, (0, None))
+            only_counts = told is not None and _without_counts(bare) == _without_counts(told)
+            if bare != told and (last or not only_counts or now_ns - at_ns >= COUNTS_NS):
+                self._far_ends[link] = now_ns, bare
+                changed.append((link, bare))
+        return changed
+
+    def _news(self, states: tuple[LinkState, ...], now_ns: int, last: bool) -> tuple[LinkState, ...]:
+        news = []
+        for state in states:
+            at_ns, told = self._links.get(state.name, (0, None))
+            only_counts = told is not None and (state.up, state.reason) == (told.up, told.reason)
+            if state != told and (last or not only_counts or now_ns - at_ns >= COUNTS_NS):
+                self._links[state.name] = now_ns, state
+                news.append(state)
+        return tuple(news)
+
+
+def _without_counts(state: DialogueState) -> DialogueState:
+    return replace(state, too_old=0, too_close=0, strangers=0, unsigned=0)
