@@ -47,6 +47,14 @@ class Clocks:
 
 
 @dataclass(frozen=True, slots=True)
+class CpuClocks:
+    """Reads the CPU time of the whole process, and of the calling thread [ns]."""
+
+    process: Callable[[], int]
+    thread: Callable[[], int]
+
+
+@dataclass(frozen=True, slots=True)
 class RunRequest:
     """One run. source: the URI as given.  log, summary: files to write, None for none."""
 
