@@ -24,7 +24,10 @@ EXIT_INTERRUPTED = 130
 ONE_THREAD_EACH = ("OPENCV_FOR_THREADS_NUM", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
-for command in (fly.run, fly.demo, logs.export, logs.monitor, prepare.key, prepare.colours, fly.sitl, prepare.check):
+_COMMANDS = (
+    fly.run, fly.demo, logs.replay, logs.export, logs.monitor, prepare.key, prepare.colours, fly.sitl, prepare.check,
+)  # fmt: skip
+for command in _COMMANDS:
     app.command()(command)
 app.add_typer(bench, name="bench")
 

@@ -24,6 +24,13 @@ class Pace(StrEnum):
     FAST = "fast"
 
 
+class FrameFormat(StrEnum):
+    """How a log keeps frames: the names of `bridge.log.film`, which loads OpenCV."""
+
+    JPEG = "jpeg"
+    PNG = "png"
+
+
 class ExportFormat(StrEnum):
     """What a log can be written as."""
 

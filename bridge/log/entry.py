@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import orjson
 
 from bridge.log import triangle
+from bridge.log.film import Mark
 from bridge.wire import Sent
 from tracker import so3
 from tracker.types import BallSighting, Estimate, Event, Frame, Rejected, Step
@@ -16,7 +17,7 @@ Value = dict[str, Any]
 
 
 class FrameTime(NamedTuple):
-    """What the log keeps of a frame: all but its image, which must not wait in the queue."""
+    """What the log always keeps of a frame: all but its image, of which only few may wait in the queue."""
 
     camera: int
     t_ns: int
@@ -27,6 +28,7 @@ class Entry(NamedTuple):
     """One step and what was sent for it.
 
     now_ns: stream time when it was taken [ns].  wall_ns: the wall clock then, where one is due [ns].
+    film: its frame, or what came in place of one, where the log keeps frames.
     """
 
     now_ns: int
@@ -35,15 +37,23 @@ class Entry(NamedTuple):
     rejections: tuple[Rejected, ...]
     step: Step
     sent: tuple[Sent, ...]
+    film: Frame | Mark | None = None
 
 
-def make_entry(event: Event | None, step: Step, sent: tuple[Sent, ...], now_ns: int, wall_ns: int | None) -> Entry:
+def make_entry(
+    event: Event | None,
+    step: Step,
+    sent: tuple[Sent, ...],
+    now_ns: int,
+    wall_ns: int | None,
+    film: Frame | Mark | None = None,
+) -> Entry:
     """Keep what the log needs of one turn of the loop."""
     frame = FrameTime(event.camera, event.t_ns, event.available_ns) if isinstance(event, Frame) else None
     rejections = step.rejections
     if isinstance(event, Rejected) and event not in rejections:
         rejections = (event, *rejections)
-    return Entry(now_ns, wall_ns, frame, rejections, step, sent)
+    return Entry(now_ns, wall_ns, frame, rejections, step, sent, film=film)
 
 
 def encode(value: Value) -> bytes:

@@ -12,7 +12,7 @@ from tools.request import Clocks, CpuClocks
 ConfigOption = Annotated[str, typer.Option(help="A shipped config by name, or a path to a .toml.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")]
 SourceOption = Annotated[
-    str, typer.Option(help="recording:DIR, video:A.mp4,B.mp4, camera:0,1 or sim:NAME.", metavar="URI")
+    str, typer.Option(help="recording:DIR, video:A.mp4,B.mp4, camera:0,1, sim:NAME or log:FILE.mcap.", metavar="URI")
 ]
 
 

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from tools.commands.common import ConfigOption, SourceOption, clocks_of, tell_of_compiling
-from tools.request import DemoRequest, Pace, RunRequest
+from tools.request import DemoRequest, FrameFormat, Pace, RunRequest
+from tracker.errors import OperatorError
 
 EXIT_PATH_NOT_HELD = 1
 EXIT_FLIGHT_NOT_GOOD = 1
@@ -27,6 +28,13 @@ def run(
         ),
     ] = None,
     log: Annotated[Path | None, typer.Option(help="Record everything in this MCAP file.", metavar="FILE")] = None,
+    log_frames: Annotated[
+        FrameFormat | None,
+        typer.Option(help="Keep the frames in the log: png loses nothing, jpeg is small. Replaces the config's."),
+    ] = None,
+    log_frames_mb: Annotated[
+        float | None, typer.Option(help="Room for them [MB]; then the flight goes on without.", min=1.0, metavar="MB")
+    ] = None,
     pace: Annotated[
         Pace, typer.Option(help="real: as recorded. fast: as fast as it goes, same input, same bytes. Live is real.")
     ] = Pace.REAL,
@@ -38,7 +46,9 @@ def run(
     tell_of_compiling()
     from bridge.settings import load_settings
 
-    settings = load_settings(config).with_links(tuple(link or ()))
+    if log is None and (log_frames or log_frames_mb):
+        raise OperatorError("--log-frames: there is no log to keep them in; add --log FILE.mcap")
+    settings = load_settings(config).with_links(tuple(link or ())).with_frames(log_frames, log_frames_mb)
     request = RunRequest(settings, source, log, pace, summary, overwrite, quiet)
 
     from tools.session import run_session

@@ -9,8 +9,8 @@ from typing import Annotated
 
 import typer
 
-from tools.commands.common import JsonOption, clocks_of
-from tools.request import ExportFormat
+from tools.commands.common import JsonOption, clocks_of, tell_of_compiling
+from tools.request import ExportFormat, Pace, RunRequest
 
 STDOUT = Path("-")
 
@@ -54,3 +54,30 @@ def export(
         typer.echo(f"{report.count} estimates written to {out}", err=True)
     for loss in report.lost:
         typer.echo(f"posebridge: warning: {log}: {loss}", err=True)
+
+
+def replay(
+    context: typer.Context,
+    log: Annotated[Path, typer.Argument(help="A log that `run --log-frames` wrote.")],
+    config: Annotated[
+        str | None, typer.Option(help="Other settings, by name or path to a .toml; else the log's own.")
+    ] = None,
+    link: Annotated[
+        list[str] | None,
+        typer.Option(help="Send the poses here. Else they only go into the log of the replay.", metavar="URI"),
+    ] = None,
+    out: Annotated[Path | None, typer.Option("--log", help="Record the replay in this file.", metavar="FILE")] = None,
+    pace: Annotated[Pace, typer.Option(help="fast: same log, same bytes. real: as it was flown.")] = Pace.FAST,
+    summary: Annotated[Path | None, typer.Option(help="Write the replay's figures here.", metavar="FILE.json")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a log that exists.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Show no status line and no summary.")] = False,
+) -> None:
+    """Run the frames of a log through the tracker again; with its own settings it sends the same bytes."""
+    tell_of_compiling()
+    from bridge.settings import load_settings
+    from tools.replay import on_paper, settings_of
+    from tools.session import run_session
+
+    settings = (settings_of(log) if config is None else load_settings(config)).with_frames("off", None)
+    settings = settings.with_links(tuple(link)) if link else on_paper(settings)
+    run_session(RunRequest(settings, f"log:{log}", out, pace, summary, overwrite, quiet), clocks_of(context))
