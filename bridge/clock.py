@@ -35,6 +35,26 @@ class StreamClock:
         self._now_ns = max(self._now_ns, event.t_ns)
 
 
+class Timed(Protocol):
+    """What knows the stream time at which its newest event was taken."""
+
+    now_ns: int
+
+
+class ReplayClock:
+    """Time stands where it stood when the flight's loop took the event that a replay takes now."""
+
+    def __init__(self, source: Timed) -> None:
+        self._source = source
+
+    def now_ns(self) -> int:
+        """Return the flight's stream time then [ns]."""
+        return self._source.now_ns
+
+    def follow(self, event: Frame | Silence) -> None:
+        """Ignore the event: the source knows."""
+
+
 class HostClock:
     """The host's monotonic clock, shifted so that `origin_ns` of the stream is the instant this object is made.
 

@@ -13,6 +13,7 @@ from typing import Self
 from bridge.backlog import Backlog
 from bridge.heard import NOTHING, Heard
 from bridge.log.entry import Entry, make_entry
+from bridge.log.film import FILM_METADATA, Film, FilmTerms
 from bridge.log.stream import open_stream
 from bridge.log.tlog import TlogWriter
 from bridge.log.writer import Cover, LogWriter
@@ -26,6 +27,7 @@ from tracker.types import Event, Step
 FLUSH_NS = 500_000_000
 CLOCK_NS = 1_000_000_000
 CAPACITY = 1024
+CAPACITY_WITH_FRAMES = 32  # where the loop waits for the log: each may hold an image
 CLOSE_S = 10.0
 STALL_S = 0.5
 
@@ -37,6 +39,7 @@ class RecorderState:
     path: the log's, as given.
     written: steps handed to the kernel.  dropped: steps that are not in the log and never will be.
     size_bytes: of the log.  error: why recording stopped, in one line; None while all is well.
+    frames: what is wrong with the frames in it, "" for nothing.
     """
 
     path: Path
@@ -44,6 +47,7 @@ class RecorderState:
     dropped: int
     size_bytes: int
     error: str | None
+    frames: str = ""
 
 
 class Recorder:
@@ -62,6 +66,7 @@ class Recorder:
         overwrite: replace files that exist.
         block_when_full: wait for the disk instead of dropping, for input that is not live.
         capacity: steps the queue holds; 1024 are some 17 s of two cameras at 30 Hz.
+        film: keep the frames too, and how; None for no frames.
     Raises:
         OperatorError: the file exists, or the path cannot be opened.
     """
@@ -79,14 +84,19 @@ class Recorder:
         overwrite: bool = False,
         block_when_full: bool = False,
         capacity: int = CAPACITY,
+        film: FilmTerms | None = None,
     ) -> None:
         self._path = path
         self._wall_clock = wall_clock
         self._block = block_when_full
         self._stream = open_stream(path, overwrite)
         self._tlog = self._open_tlog(tlog, overwrite)
+        self._film = None if film is None else Film(film)
+        if film is not None:
+            metadata = {**metadata, FILM_METADATA: {"format": film.format.value}}
         self._cover = Cover(attachments, metadata, cameras, marker, wall_clock())
-        self._backlog = Backlog(capacity)
+        waits_with_images = film is not None and block_when_full
+        self._backlog = Backlog(min(capacity, CAPACITY_WITH_FRAMES) if waits_with_images else capacity)
         self._clock_due_ns: int | None = None
         self._closed = False
         self._error: str | None = None
@@ -105,7 +115,8 @@ class Recorder:
 
         event: None at the end of all events.
         """
-        entry = make_entry(event, step, sent, now_ns, self._wall_time_if_due(now_ns), heard)
+        film = None if self._film is None else self._film.admit(event, wait=self._block)
+        entry = make_entry(event, step, sent, now_ns, self._wall_time_if_due(now_ns), heard, film)
         if self._closed or not self._put(entry):
             self._refused += 1
 
@@ -114,7 +125,8 @@ class Recorder:
         error = self._error or (None if self._tlog is None else self._tlog.error)
         if error is None and not self._closed and not self._thread.is_alive():
             error = f"log {self._path}: the recorder's thread is gone, which is a bug; its traceback is on stderr"
-        return RecorderState(self._path, self._written, self._refused + self._lost, self._stream.size_bytes, error)
+        dropped, frames = self._refused + self._lost, "" if self._film is None else self._film.trouble()
+        return RecorderState(self._path, self._written, dropped, self._stream.size_bytes, error, frames)
 
     def close(self) -> None:
         """Write what is queued, end the file properly and wait for it, at most 10 s. A second call does nothing."""
@@ -158,7 +170,7 @@ class Recorder:
 
     def _begin(self) -> LogWriter | None:
         try:
-            return LogWriter(self._stream, self._cover)
+            return LogWriter(self._stream, self._cover, self._film)
         except OSError as error:
             self._stop(error)
             return None
@@ -193,7 +205,14 @@ class Recorder:
                 self._flush(writer)
                 flushed_ns = entry.now_ns
         self._flush(writer)
-        writer.finish({"steps_written": str(self._written), "steps_dropped": str(self._refused)})
+        writer.finish({"steps_written": str(self._written), "steps_dropped": str(self._refused)} | self._film_counts())
+
+    def _film_counts(self) -> dict[str, str]:
+        if self._film is None:
+            return {}
+        state = self._film.state()
+        counts = {"stored": state.stored, "missed": state.missed, "bytes": state.size_bytes}
+        return {f"frames_{name}": str(count) for name, count in counts.items()}
 
     def _flush(self, writer: LogWriter) -> None:
         writer.flush()

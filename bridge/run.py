@@ -65,7 +65,8 @@ class Outlets:
         state = self.recorder.state()
         if state.error is not None:
             return f"STOPPED: {state.error}"
-        return f"{state.size_bytes / 1e6:.1f} MB" + (f", {state.dropped} steps dropped" if state.dropped else "")
+        dropped = f"{state.dropped} steps dropped" if state.dropped else ""
+        return ", ".join(word for word in (f"{state.size_bytes / 1e6:.1f} MB", dropped, state.frames) if word)
 
     def surroundings(self) -> Surroundings:
         """Return how links, their far ends and the log stand."""

@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import math
-import shutil
-import sys
-import tempfile
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-
-import typer
 
 from bridge.log import topics, triangle
 from bridge.log.losses import Loss
@@ -79,30 +74,6 @@ def export(log_path: Path, format: str, out_path: Path) -> Report:
     with _whole_or_absent(out_path) as path:
         count = chosen.write(reader.records(chosen.topics), path)
     return Report(count, reader.lost)
-
-
-def export_log(log_path: Path, format: str, out_path: Path | None) -> None:
-    """Export as the command line asks, and say on stderr what came of it.
-
-    Args:
-        out_path: `-` for stdout; None for the log's own name with the format's ending.
-    Raises:
-        OperatorError: as `export` does.
-    """
-    if out_path == Path("-"):
-        with tempfile.TemporaryDirectory() as folder:
-            report = export(log_path, format, Path(folder) / format)
-            with (Path(folder) / format).open("rb") as file:
-                shutil.copyfileobj(file, sys.stdout.buffer)
-            sys.stdout.flush()
-        written = "stdout"
-    else:
-        out_path = out_path or log_path.with_suffix(f".{format}")
-        report = export(log_path, format, out_path)
-        written = str(out_path)
-    typer.echo(f"{written}: {report.count} estimates", err=True)
-    for loss in report.lost:
-        typer.echo(f"log {log_path}: {loss}", err=True)
 
 
 def tum_line(estimate: Mapping[str, Any]) -> str:

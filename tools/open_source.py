@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from bridge.clock import Clock, ReplayClock
+from bridge.log.footage import LogSource
 from bridge.settings import ChosenRig, Settings, rig_of
 from bridge.settings.models import CameraSettings
 from tools.request import Clocks
@@ -25,12 +27,16 @@ class OpenedSource:
 
     live: its frames come by themselves, in the host's monotonic time; `--pace` does not apply.
     warnings: one line each for what the operator should know but need not mend.
+    clock: the stream time of a source that knows its own, for pace `fast`; None for that of its frames.
+    troubles: gives more such lines once the source has ended.
     """
 
     source: Source
     chosen: ChosenRig
     live: bool
     warnings: tuple[str, ...] = ()
+    clock: Clock | None = None
+    troubles: Callable[[], tuple[str, ...]] = tuple
 
 
 def open_source(text: str, settings: Settings, clocks: Clocks) -> OpenedSource:
@@ -74,6 +80,12 @@ def _open_simulation(uri: SourceUri, settings: Settings, clocks: Clocks) -> Open
     return OpenedSource(SimSource(chosen.rig, path, clocks.stopwatch), chosen, live=False)
 
 
+def _open_log(uri: SourceUri, settings: Settings, clocks: Clocks) -> OpenedSource:
+    source = LogSource(Path(uri.argument), clocks.stopwatch)
+    chosen = rig_of(settings, source.cameras, source.camera_count)
+    return OpenedSource(source, chosen, False, clock=ReplayClock(source), troubles=lambda: source.troubles)
+
+
 def _doubts(chosen: ChosenRig) -> tuple[str, ...]:
     """Warn of real cameras seen by a drawing."""
     if not chosen.nominal:
@@ -104,4 +116,5 @@ _OPENERS: Mapping[SourceKind, Callable[[SourceUri, Settings, Clocks], OpenedSour
     SourceKind.VIDEO: _open_video,
     SourceKind.CAMERA: _open_cameras,
     SourceKind.SIM: _open_simulation,
+    SourceKind.LOG: _open_log,
 }

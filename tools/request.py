@@ -24,6 +24,13 @@ class Pace(StrEnum):
     FAST = "fast"
 
 
+class FrameFormat(StrEnum):
+    """How a log keeps frames: the names of `bridge.log.film`, which loads OpenCV."""
+
+    JPEG = "jpeg"
+    PNG = "png"
+
+
 class ExportFormat(StrEnum):
     """What a log can be written as."""
 
@@ -44,6 +51,14 @@ class Clocks:
     stopwatch: Callable[[], int]
     wall: Callable[[], int]
     sleep_s: Callable[[float], None]
+
+
+@dataclass(frozen=True, slots=True)
+class CpuClocks:
+    """Reads the CPU time of the whole process, and of the calling thread [ns]."""
+
+    process: Callable[[], int]
+    thread: Callable[[], int]
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,7 @@ from rich.console import Console
 
 from bridge.alarms import Limits
 from bridge.clock import Clock, HostClock, StreamClock
+from bridge.log.film import MEGABYTE, FilmTerms, FrameFormat
 from bridge.monitor import Monitor
 from bridge.outlet import Outlet, open_outlet
 from bridge.pace import Paced, first_time_ns
@@ -77,24 +78,27 @@ def run_session(request: RunRequest, clocks: Clocks) -> None:
             close(clock, outlets)
             stack.close()
             if not refused:
-                _report(outlets, request, console)
+                _report(outlets, request, console, opened.troubles())
 
 
-def _report(outlets: Outlets, request: RunRequest, console: Console) -> None:
+def _report(outlets: Outlets, request: RunRequest, console: Console, source_troubles: tuple[str, ...]) -> None:
     """Give the run's figures, an interrupted one's too, on stdout; what went wrong on stderr, quiet or not."""
     summary = outlets.summary(None if request.log is None else str(request.log))
     if not request.quiet:
         Console().print(to_text(summary), soft_wrap=True)
-    for trouble in _troubles(summary, outlets.monitor.last_rejection):
+    frames = "" if outlets.recorder is None else outlets.recorder.state().frames
+    for trouble in (*source_troubles, *_troubles(summary, outlets.monitor.last_rejection, frames)):
         console.print(f"posebridge: warning: {trouble}", style="yellow", soft_wrap=True, highlight=False)
     if request.summary is not None:
         write_summary(request.summary, summary)
 
 
-def _troubles(summary: Summary, last_rejection: str) -> Iterator[str]:
+def _troubles(summary: Summary, last_rejection: str, frames: str) -> Iterator[str]:
     """Yield what the operator must not miss, a line each."""
     if summary.log is not None and summary.log.error:
         yield summary.log.error
+    if frames:
+        yield frames
     if not summary.estimates_sent:
         why = f"; last: {last_rejection}" if last_rejection else ""
         yield f"no pose was found in any frame{why}; check colours, marker and that T_BS is camera to room"
@@ -137,6 +141,7 @@ def recorder_of(
         marker=rig.marker,
         wall_clock=clocks.wall,
         tlog=tlog_beside(path),
+        film=film_of(settings),
         **how,
     )
 
@@ -152,6 +157,14 @@ def tlog_beside(log: Path) -> Path | None:
     if log.suffix == TLOG:
         raise OperatorError(f"log {log}: a {TLOG} is written beside the MCAP log; name it {log.with_suffix('.mcap')}")
     return log.with_suffix(TLOG)
+
+
+def film_of(settings: Settings) -> FilmTerms | None:
+    """Say how a log keeps frames, None where it keeps none."""
+    log = settings.log
+    if log.frames == "off":
+        return None
+    return FilmTerms(FrameFormat(log.frames), round(log.frames_mb * MEGABYTE), log.jpeg_quality)
 
 
 def telemetry_of(source: str, settings: Settings, rig: Rig, monitor: Monitor, clocks: Clocks) -> Telemetry:
@@ -178,7 +191,7 @@ def _paced(opened: OpenedSource, pace: Pace, clocks: Clocks) -> tuple[Iterator[E
     if opened.live:
         return iter(opened.source), HostClock(clocks.monotonic)
     if pace is Pace.FAST:
-        return iter(opened.source), StreamClock()
+        return iter(opened.source), opened.clock or StreamClock()
     start_ns, events = first_time_ns(opened.source)
     clock = HostClock(clocks.monotonic, start_ns)
     return iter(Paced(events, clock, clocks.sleep_s, clocks.stopwatch)), clock

@@ -71,12 +71,14 @@ class Frame:
     t_ns: middle of the exposure [ns].
     image: (height, width, 3) BGR, 8 bit.
     available_ns: stopwatch reading when the image stood in memory [ns]; latency counts from here.
+    encoded: the image file it was decoded from, empty if it did not come as one.
     """
 
     camera: int
     t_ns: int
     image: Image
     available_ns: int = 0
+    encoded: bytes = b""
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,6 +9,7 @@ import orjson
 
 from bridge.heard import NOTHING, Heard
 from bridge.log import triangle
+from bridge.log.film import Mark
 from bridge.wire import Sent
 from tracker import so3
 from tracker.types import BallSighting, Estimate, Event, Frame, Rejected, Step
@@ -17,7 +18,7 @@ Value = dict[str, Any]
 
 
 class FrameTime(NamedTuple):
-    """What the log keeps of a frame: all but its image, which must not wait in the queue."""
+    """What the log always keeps of a frame: all but its image, of which only few may wait in the queue."""
 
     camera: int
     t_ns: int
@@ -28,6 +29,7 @@ class Entry(NamedTuple):
     """One step, what was sent for it, and what was heard meanwhile.
 
     now_ns: stream time when it was taken [ns].  wall_ns: the wall clock then, where one is due [ns].
+    film: its frame, or what came in place of one, where the log keeps frames.
     """
 
     now_ns: int
@@ -37,6 +39,7 @@ class Entry(NamedTuple):
     step: Step
     sent: tuple[Sent, ...]
     heard: Heard = NOTHING
+    film: Frame | Mark | None = None
 
 
 def make_entry(
@@ -46,13 +49,14 @@ def make_entry(
     now_ns: int,
     wall_ns: int | None,
     heard: Heard = NOTHING,
+    film: Frame | Mark | None = None,
 ) -> Entry:
     """Keep what the log needs of one turn of the loop."""
     frame = FrameTime(event.camera, event.t_ns, event.available_ns) if isinstance(event, Frame) else None
     rejections = step.rejections
     if isinstance(event, Rejected) and event not in rejections:
         rejections = (event, *rejections)
-    return Entry(now_ns, wall_ns, frame, rejections, step, sent, heard)
+    return Entry(now_ns, wall_ns, frame, rejections, step, sent, heard, film)
 
 
 def encode(value: Value) -> bytes:

@@ -9,9 +9,11 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
 from foxglove_schemas_protobuf.CameraCalibration_pb2 import CameraCalibration
+from foxglove_schemas_protobuf.CompressedImage_pb2 import CompressedImage
 from foxglove_schemas_protobuf.FrameTransform_pb2 import FrameTransform
 from foxglove_schemas_protobuf.FrameTransforms_pb2 import FrameTransforms
 from foxglove_schemas_protobuf.Log_pb2 import Log
@@ -27,6 +29,7 @@ Schema = dict[str, Any]
 ROOM, BODY = "room", "body"  # frame ids; a camera's is `camera/<name>`
 SENT_PREFIX = "/mavlink/sent/"
 CALIBRATION_PREFIX = "/calibration/"
+CAMERA_PREFIX = "/camera/"
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +86,12 @@ def protobuf_topic(name: str, message: Any) -> Topic:
 def calibration_topic(camera: str) -> Topic:
     """Make the topic of one camera's intrinsics."""
     return protobuf_topic(CALIBRATION_PREFIX + camera, CameraCalibration)
+
+
+@cache
+def image_topic(camera: str) -> Topic:
+    """Make the topic of one camera's frames."""
+    return protobuf_topic(CAMERA_PREFIX + camera, CompressedImage)
 
 
 def sent_topic(message: str, fields: Mapping[str, FieldValue]) -> Topic:
@@ -177,6 +186,15 @@ CLOCK = json_topic(
     "posebridge.Clock",
     stream_ns=integer("stream time [ns]"),
     wall_ns=integer("wall clock at the same instant, since 1970-01-01 UTC [ns]"),
+)
+EVENTS = json_topic(
+    "/events",
+    "posebridge.Event",
+    kind=text("silence, rejected, missed, full or end: what stands between the frames, for a replay"),
+    t_ns=integer("its own stream time, 0 for none [ns]"),
+    camera=integer("index of the camera, -1 for none"),
+    reason=text("why the source gave something up, else empty"),
+    detail=text("in words"),
 )
 
 FIXED = (POSE, VEHICLE_TF, CAMERA_TF, MARKER, LOG, ESTIMATE, LATENCY, SIGHTINGS, REJECTIONS, CLOCK)

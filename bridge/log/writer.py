@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from io import BufferedWriter
@@ -13,15 +12,16 @@ from foxglove_schemas_protobuf.Log_pb2 import Log
 
 from bridge.log import entry as values
 from bridge.log import scene, topics, vehicle
+from bridge.log.calibration import CALIBRATION_ATTACHMENT, calibration_json
 from bridge.log.container import Container
 from bridge.log.entry import Entry, encode
+from bridge.log.film import Film, Mark, MarkKind, image_message, mark_value
 from bridge.log.received import HeardWriter
 from bridge.wire import Sent
 from tracker.camera import Camera
 from tracker.rig import Marker
-from tracker.types import Estimate, TrackState
+from tracker.types import Estimate, Frame, TrackState
 
-CALIBRATION_ATTACHMENT = "calibration.json"
 _MEDIA_TYPES = {
     ".toml": "application/toml",
     ".json": "application/json",
@@ -67,18 +67,21 @@ class Channel:
 class LogWriter:
     """Write a log to a stream that it then owns. For one thread.
 
+    film: makes image files of frames, None where the log keeps none.
     Raises:
         OSError: from every method, whatever the stream raises.
     """
 
-    def __init__(self, stream: BufferedWriter, cover: Cover) -> None:
+    def __init__(self, stream: BufferedWriter, cover: Cover, film: Film | None = None) -> None:
         self._stream = stream
+        self._film = film
         self._container = Container(stream)
         self._cover = cover
         self._channels: dict[str, Channel] = {}
         self._state: TrackState | None = None
         self._reset_counter: int | None = None
         self._heard = HeardWriter(self._json)
+        self._film_ended = False
         self._begin()
 
     def write(self, entry: Entry) -> None:
@@ -88,6 +91,8 @@ class LogWriter:
         now_ns = entry.now_ns
         if entry.wall_ns is not None:
             self._json(topics.CLOCK, {"stream_ns": now_ns, "wall_ns": entry.wall_ns}, now_ns, now_ns)
+        if entry.film is not None and self._film is not None:
+            self._write_film(entry.film, self._film, now_ns)
         if entry.frame is not None:
             value = values.sightings_value(entry.frame, entry.step.sightings)
             self._json(topics.SIGHTINGS, value, now_ns, entry.frame.t_ns)
@@ -118,7 +123,7 @@ class LogWriter:
     def _begin(self) -> None:
         for name, entries in self._cover.metadata.items():
             self._container.add_metadata(name, entries)
-        drawn = {CALIBRATION_ATTACHMENT: _calibration(self._cover.cameras, self._cover.marker)}
+        drawn = {CALIBRATION_ATTACHMENT: calibration_json(self._cover.cameras, self._cover.marker)}
         for name, data in (drawn | dict(self._cover.attachments)).items():
             media_type = _MEDIA_TYPES.get(PurePath(name).suffix, "application/octet-stream")
             self._container.add_attachment(self._cover.made_ns, name, media_type, data)
@@ -145,6 +150,22 @@ class LogWriter:
             message = f"the estimate jumped: reset_counter {self._reset_counter} -> {estimate.reset_counter}"
             self._remark(now_ns, t_ns, Log.WARNING, "tracker", message)
         self._reset_counter = estimate.reset_counter
+
+    def _write_film(self, kept: Frame | Mark, film: Film, now_ns: int) -> None:
+        """Append a frame's image, or the mark of what came in its place."""
+        if isinstance(kept, Frame):
+            camera = self._cover.cameras[kept.camera]
+            data = film.develop(kept)
+            if data is not None:
+                image = image_message(data, kept.t_ns, scene.camera_frame(camera))
+                self._channel(topics.image_topic(camera.name)).put(image, now_ns, kept.t_ns)
+                return
+            if self._film_ended:
+                return
+            self._film_ended = True
+            self.warn(now_ns, film.trouble())
+            kept = Mark(MarkKind.FULL)
+        self._json(topics.EVENTS, mark_value(kept), now_ns, now_ns)
 
     def _write_sent(self, sent: Sent, now_ns: int) -> None:
         name = topics.SENT_PREFIX + sent.message
@@ -174,24 +195,3 @@ class LogWriter:
         if channel is None:
             channel = self._channels[topic.name] = Channel(self._container, topic)
         return channel
-
-
-def _calibration(cameras: tuple[Camera, ...], marker: Marker) -> bytes:
-    """Return cameras and marker as JSON text: what the tracker really used, whatever files it came from."""
-    content = {
-        "cameras": [
-            {
-                "name": camera.name,
-                "resolution_px": [camera.width_px, camera.height_px],
-                "K_px": camera.K.tolist(),
-                "distortion": camera.distortion.tolist(),
-                "R_CtoW": camera.R_CtoW.tolist(),
-                "p_CinW_m": camera.p_CinW.tolist(),
-            }
-            for camera in cameras
-        ],
-        "marker": [
-            {"name": ball.name, "p_inB_m": ball.p_inB.tolist(), "radius_m": ball.radius_m} for ball in marker.balls
-        ],
-    }
-    return json.dumps(content, indent=1).encode()

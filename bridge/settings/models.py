@@ -173,6 +173,14 @@ class OriginSettings(Section):
         return self
 
 
+class LogSettings(Section):
+    """Whether a log keeps the frames themselves, and how much of the disk they may take."""
+
+    frames: Literal["off", "jpeg", "png"] = "off"
+    frames_mb: Positive = 4000.0
+    jpeg_quality: Annotated[int, Strict(), Field(ge=1, le=100)] = 95
+
+
 class LinkSettings(Section):
     """One way to an autopilot, and what goes over it at every estimate: the profile's messages unless it names some."""
 
@@ -195,6 +203,7 @@ class Settings(Section):
     mavlink: MavlinkSettings = MavlinkSettings()
     origin: OriginSettings | None = None
     monitor: MonitorSettings = MonitorSettings()
+    log: LogSettings = LogSettings()
     links: tuple[LinkSettings, ...] = ()
 
     @model_validator(mode="after")
@@ -210,6 +219,15 @@ class Settings(Section):
         if not uris:
             return self
         return self.model_copy(update={"links": tuple(LinkSettings.model_construct(uri=uri) for uri in uris)})
+
+    def with_frames(self, frames: str | None, frames_mb: float | None) -> Settings:
+        """Return these settings with the command line's word on the frames in the log, where it has one.
+
+        The command line has checked both.
+        """
+        said = {"frames": frames, "frames_mb": frames_mb}
+        log = self.log.model_copy(update={key: value for key, value in said.items() if value is not None})
+        return self.model_copy(update={"log": log})
 
 
 def refuse_twins(what: str, names: Sequence[str]) -> None:

@@ -9,9 +9,9 @@ from typing import Any
 import orjson
 
 from bridge.alarms import Limits
+from bridge.log.calibration import CALIBRATION_ATTACHMENT
 from bridge.log.reader import LogReader
 from bridge.log.turns import turns
-from bridge.log.writer import CALIBRATION_ATTACHMENT
 from bridge.monitor import Monitor
 from bridge.telemetry.far_side import FarSide
 from bridge.telemetry.gauges import Names

@@ -88,6 +88,20 @@ def test_a_config_that_is_no_toml_names_the_line(tmp_path: Path) -> None:
     assert "line 2" in refusal("run", "--config", config)
 
 
+def test_frames_without_a_log_to_keep_them_in_are_refused() -> None:
+    assert refusal("run", "--log-frames", "png") == (
+        "--log-frames: there is no log to keep them in; add --log FILE.mcap"
+    )
+
+
+def test_a_log_without_frames_cannot_be_replayed(tmp_path: Path) -> None:
+    record(tmp_path / "flight.mcap", turns(2))
+    assert "holds no config; name one with --config" in refusal("replay", tmp_path / "flight.mcap")
+    assert "holds no frames; record one with `run --log FILE --log-frames png`" in refusal(
+        "replay", tmp_path / "flight.mcap", "--config", "lab"
+    )
+
+
 def test_a_log_that_is_not_there_cannot_be_exported(tmp_path: Path) -> None:
     assert "gone.mcap" in refusal("export", tmp_path / "gone.mcap", "--format", "tum")
 

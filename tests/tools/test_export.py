@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 
 from tests.bridge.estimates import estimate, step
 from tests.bridge.recordings import record, turns
-from tools.export import CSV_COLUMNS, export, export_log
+from tools.export import CSV_COLUMNS, export
 from tracker import so3
 from tracker.errors import OperatorError
 from tracker.types import Silence, frozen_array
@@ -159,20 +159,3 @@ def test_a_pipe_is_written_as_it_goes(log: Path, tmp_path: Path) -> None:
     drain.join()
     assert received[0].count("\n") == 30
     assert (tmp_path / "pipe").is_fifo()
-
-
-def test_the_command_names_the_file_beside_the_log_and_tells_count_and_losses(
-    log: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    export_log(log, "tum", None)
-    assert capsys.readouterr().err == f"{log.with_suffix('.tum')}: 30 estimates\n"
-    log.write_bytes(log.read_bytes()[:-20_000])
-    export_log(log, "csv", log.with_name("b.csv"))
-    assert "bytes lost" in capsys.readouterr().err
-
-
-def test_the_command_writes_to_stdout_for_a_dash(log: Path, capfdbinary: pytest.CaptureFixture[bytes]) -> None:
-    export_log(log, "tum", Path("-"))
-    out, err = capfdbinary.readouterr()
-    assert out.count(b"\n") == 30
-    assert err == b"stdout: 30 estimates\n"

@@ -12,11 +12,10 @@ import pytest
 from typer.testing import CliRunner
 
 from bridge.settings import load_settings
-from tools.bench.meter import CpuClocks
 from tools.bench.pairs import GARBAGE, LOG, LOOP, MACHINE, Pair, shares_of, slow_of, stages_of
 from tools.bench.speed import Speed, measure_speed
 from tools.cli import app
-from tools.request import Clocks
+from tools.request import Clocks, CpuClocks
 from tools.steady import steady
 
 PAIRS = 12

@@ -15,10 +15,9 @@ from bridge.summary import to_text
 from tools.bench.accuracy import Accuracy, Limit, measure_accuracy
 from tools.bench.consistency import Average, measure_consistency
 from tools.bench.memory import measure_memory
-from tools.bench.meter import CpuClocks
 from tools.bench.rooms import measure_rooms
 from tools.bench.speed import Speed, measure_speed
-from tools.request import Clocks
+from tools.request import Clocks, CpuClocks
 
 WIDTH = 140  # of the accuracy table; a narrower terminal wraps it
 

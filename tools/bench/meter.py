@@ -5,20 +5,12 @@ from __future__ import annotations
 import gc
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 
 from bridge.clock import Nanoseconds
 from tools.bench.pairs import Pair
 from tools.bench.stages import Stages
+from tools.request import CpuClocks
 from tracker.types import Event, Frame
-
-
-@dataclass(frozen=True, slots=True)
-class CpuClocks:
-    """Reads the CPU time of the whole process, and of the calling thread [ns]."""
-
-    process: Nanoseconds
-    thread: Nanoseconds
 
 
 class Meter:

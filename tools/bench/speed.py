@@ -18,11 +18,11 @@ from bridge.run import Outlets, close, run
 from bridge.settings import Settings
 from bridge.summary import Percentiles, Summary
 from tools.bench.footage import Footage
-from tools.bench.meter import CpuClocks, Meter
+from tools.bench.meter import Meter
 from tools.bench.one_core import one_core
 from tools.bench.pairs import Slow, shares_of, slow_of, spread, stages_of
 from tools.bench.stages import Stages, TimedLink, TimedMonitor, TimedPacker, TimedRecorder, TimedTracker
-from tools.request import Clocks
+from tools.request import Clocks, CpuClocks
 from tools.session import recorder_of, tracker_of
 from tools.steady import steady
 from tracker.types import Frame, Silence, TrackState

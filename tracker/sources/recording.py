@@ -71,16 +71,17 @@ class RecordingSource(ClosesOnExit):
         if entry.late:
             return Rejected(Reason.LATE, entry.late, entry.t_ns, entry.camera)
         try:
-            image = decode_image(entry.path.read_bytes())
+            data = entry.path.read_bytes()
         except OSError as error:
             return Rejected(Reason.UNDECODABLE, f"{entry.path}: {error.strerror}", entry.t_ns, entry.camera)
+        image = decode_image(data)
         available_ns = self._stopwatch()
         if image is None:
             return Rejected(Reason.UNDECODABLE, f"{entry.path}: no whole image", entry.t_ns, entry.camera)
         if not self._fits(entry, image):
             width, height = size_px(image)
             return Rejected(Reason.WRONG_SIZE, f"{entry.path}: {width} x {height} px", entry.t_ns, entry.camera)
-        return Frame(entry.camera, entry.t_ns, image, available_ns)
+        return Frame(entry.camera, entry.t_ns, image, available_ns, data)
 
     def _fits(self, entry: _Entry, image: Image) -> bool:
         """Say whether an image has its calibration's size; a camera's first image must have it."""

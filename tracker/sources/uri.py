@@ -15,6 +15,7 @@ class SourceKind(StrEnum):
     VIDEO = "video"
     CAMERA = "camera"
     SIM = "sim"
+    LOG = "log"
 
 
 EXAMPLES = {
@@ -22,8 +23,9 @@ EXAMPLES = {
     SourceKind.VIDEO: "video:LEFT.mp4,RIGHT.mp4",
     SourceKind.CAMERA: "camera:0,1",
     SourceKind.SIM: "sim:NAME",
+    SourceKind.LOG: "log:FILE.mcap",
 }
-_NEEDS_ARGUMENT = frozenset({SourceKind.RECORDING, SourceKind.VIDEO})
+_NEEDS_ARGUMENT = frozenset({SourceKind.RECORDING, SourceKind.VIDEO, SourceKind.LOG})
 
 
 @dataclass(frozen=True, slots=True)

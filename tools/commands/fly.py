@@ -1,0 +1,107 @@
+"""The commands that fly: the main job, the demo, an autopilot's own software."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tools.commands.common import ConfigOption, SourceOption, clocks_of, tell_of_compiling
+from tools.request import DemoRequest, FrameFormat, Pace, RunRequest
+from tracker.errors import OperatorError
+
+EXIT_PATH_NOT_HELD = 1
+EXIT_FLIGHT_NOT_GOOD = 1
+
+
+def run(
+    context: typer.Context,
+    config: ConfigOption = "lab",
+    source: SourceOption = "camera:0,1",
+    link: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="udpout:HOST:PORT, udpin:HOST:PORT, serial:DEVICE:BAUD or tcp:HOST:PORT, once for each link. "
+            "Replaces the config's links.",
+            metavar="URI",
+        ),
+    ] = None,
+    log: Annotated[Path | None, typer.Option(help="Record everything in this MCAP file.", metavar="FILE")] = None,
+    log_frames: Annotated[
+        FrameFormat | None,
+        typer.Option(help="Keep the frames in the log: png loses nothing, jpeg is small. Replaces the config's."),
+    ] = None,
+    log_frames_mb: Annotated[
+        float | None, typer.Option(help="Room for them [MB]; then the flight goes on without.", min=1.0, metavar="MB")
+    ] = None,
+    pace: Annotated[
+        Pace, typer.Option(help="real: as recorded. fast: as fast as it goes, same input, same bytes. Live is real.")
+    ] = Pace.REAL,
+    summary: Annotated[Path | None, typer.Option(help="Write the run's figures here.", metavar="FILE.json")] = None,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a log that exists.")] = False,
+    quiet: Annotated[bool, typer.Option("--quiet", help="Show no status line and no summary.")] = False,
+) -> None:
+    """Track the vehicle and send its pose to the autopilot; Ctrl-C ends it."""
+    tell_of_compiling()
+    from bridge.settings import load_settings
+
+    if log is None and (log_frames or log_frames_mb):
+        raise OperatorError("--log-frames: there is no log to keep them in; add --log FILE.mcap")
+    settings = load_settings(config).with_links(tuple(link or ())).with_frames(log_frames, log_frames_mb)
+    request = RunRequest(settings, source, log, pace, summary, overwrite, quiet)
+
+    from tools.session import run_session
+
+    run_session(request, clocks_of(context))
+
+
+def demo(
+    context: typer.Context,
+    duration_s: Annotated[
+        float, typer.Option("--duration_s", "--duration-s", help="Length of the flight [s].", metavar="S")
+    ] = 60.0,
+    seed: Annotated[int, typer.Option(help="Same seed, same flight, same noise.", metavar="N")] = 1,
+    out: Annotated[Path, typer.Option(help="Folder for the log and the summary.", metavar="DIR")] = Path("logs/demo"),
+    pace: Annotated[Pace, typer.Option(help="real: watch it fly. fast: as fast as it goes.")] = Pace.REAL,
+) -> None:
+    """Fly a simulated helicopter on simulated cameras, closed loop, with nothing attached.
+
+    Exit code 0 only if it held its path; else 1.
+    """
+    request = DemoRequest(duration_s, seed, out, pace)
+
+    tell_of_compiling()
+    from tools.demo import run_demo
+
+    if not run_demo(request, clocks_of(context)).verdict.passed:
+        raise typer.Exit(EXIT_PATH_NOT_HELD)
+
+
+def sitl(
+    context: typer.Context,
+    binary: Annotated[
+        Path | None,
+        typer.Option(help="ArduPilot's SITL program (docs/sitl.md); else the project's simulated autopilot."),
+    ] = None,
+    connect: Annotated[
+        str | None,
+        typer.Option(help="tcp:HOST:PORT of SERIAL0 of ArduPilot's SITL that runs already.", metavar="URI"),
+    ] = None,
+    frame: Annotated[str, typer.Option(help="The vehicle: heli.")] = "heli",
+    config: ConfigOption = "lab",
+    faults: Annotated[bool, typer.Option("--faults", help="Rehearse what may go wrong, in the air.")] = False,
+    out: Annotated[Path, typer.Option(help="Folder for log and report.", metavar="DIR")] = Path("logs/sitl"),
+) -> None:
+    """Fly an autopilot's own software on simulated cameras: origin, arming, hover, square, landing.
+
+    Exit code 0 only if every figure keeps its limit; else 1.
+    """
+    from tools.sitl.session import SitlRequest
+
+    request = SitlRequest(binary, frame, config, out, faults, connect=connect)
+
+    from tools.sitl.command import run_sitl
+
+    if not run_sitl(request, clocks_of(context)).verdict.passed:
+        raise typer.Exit(EXIT_FLIGHT_NOT_GOOD)
