@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from bridge.dialogue.peer import Peer
 from bridge.dialogue.yaw_watch import NOTHING, YawReading, YawWatch
 from bridge.pack import enum, make_message, message_id
@@ -31,8 +33,11 @@ class HeadingWatch:
         self.reading: YawReading = NOTHING
 
     def take(self, attitude: Received) -> None:
-        """Take the autopilot's own attitude."""
-        self._watch.take_tilt(attitude.number("roll"), attitude.number("pitch"))
+        """Take the autopilot's own attitude; one without numbers teaches nothing, now or ever."""
+        roll, pitch = attitude.number("roll"), attitude.number("pitch")
+        if not (math.isfinite(roll) and math.isfinite(pitch)):
+            return
+        self._watch.take_tilt(roll, pitch)
         self._tilt_ns = attitude.arrived_ns
 
     def take_pose(self, t_ns: int, v_N: Array, yaw: float, armed: bool, now_ns: int) -> None:
