@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import itertools
+import json
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -11,23 +12,25 @@ from typing import Any
 
 import numpy as np
 import pytest
+from foxglove_schemas_protobuf.Log_pb2 import Log
 from mcap.reader import make_reader
 
 from bridge.dialogue import Terms
 from bridge.dialogue.peer import Autopilot, Peer
 from bridge.dialogue.streams import Wanted
-from bridge.heard import COUNTS_NS, LOOK_NS, Hearer
+from bridge.heard import COUNTS_NS, LOOK_NS, MOST, Heard, Hearer
 from bridge.links import MemoryLink, open_link
 from bridge.log import received
 from bridge.log.reader import LogReader
 from bridge.outlet import Outlet, Spout
 from bridge.pack import Encoder, Identity, Packer, Reader, make_message
 from bridge.telemetry.logged import LoggedRun
-from bridge.wire import FieldValue, Message
+from bridge.wire import FieldValue, LinkState, Message
 from tests.bridge.estimates import estimate, step
 from tests.bridge.recordings import recorder
 from tracker.types import Frame
 
+FORMAT_PAGE = Path(__file__).parents[2] / "docs" / "log-format.md"
 MS = 1_000_000
 PERIOD_NS = 20 * MS
 START_NS = 5_000_000_000
@@ -78,6 +81,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
             log.take(*turn)
             talk.say("SERVO_OUTPUT_RAW", time_usec=k * 20_000, servo1_raw=1500 + k)
             talk.say("ATTITUDE", time_boot_ms=k * 20, roll=0.5)
+        talk.say("STATUSTEXT", severity=2, text="PreArm: VisOdom: not healthy")
         for _ in range(250):
             talk.now_ns += PERIOD_NS
             sent = talk.outlet.send(step(), talk.now_ns)
@@ -137,6 +141,30 @@ def test_monitor_of_a_log_tells_the_autopilots_state(log: Path) -> None:
     assert "autopilot_silent" in {alarm.name for alarm in last.alarms}
 
 
+def test_what_pilot_and_autopilot_were_told_stands_in_the_log_panel_in_words(log: Path) -> None:
+    lines = [(value.level, value.name, value.message) for value in values(log, "/log")]
+    assert (Log.ERROR, "system 1", "PreArm: VisOdom: not healthy") in lines
+    assert (Log.INFO, f"to {LINK}", "posebridge: track tracking") in lines
+    assert (Log.WARNING, f"to {LINK}", "posebridge: autopilot silent") in lines
+
+
+def test_a_link_that_goes_down_and_up_is_told_in_the_log_panel_once_each() -> None:
+    told: list[tuple[object, ...]] = []
+    writer = received.HeardWriter(lambda *_: None, lambda *line: told.append(line[2:]))
+    up = LinkState(LINK, True, "", 5, 0, 0)
+    for state in (up, up, replace(up, up=False, reason="no device"), replace(up, up=False, reason="no device"), up):
+        writer.write(Heard(links=(state,)), START_NS)
+    assert told == [(Log.WARNING, LINK, "link down: no device"), (Log.INFO, LINK, "link up again")]
+
+
+def test_the_manual_names_every_topic_and_field_of_the_far_end() -> None:
+    manual = FORMAT_PAGE.read_text(encoding="utf-8")
+    (message,) = Reader().feed(Encoder(Identity(1, 1))(make_message("ATTITUDE", 0), 0))
+    for topic in (received.TIMESYNC, received.AUTOPILOT, received.LINK, received.received_topic(message)):
+        assert f"`{topic.name.replace('ATTITUDE', 'NAME')}`" in manual
+        assert [name for name in json.loads(topic.schema)["properties"] if f"`{name}`" not in manual] == []
+
+
 @pytest.mark.parametrize(
     ("fields", "boot_ns"),
     [
@@ -161,6 +189,17 @@ def test_states_read_back_as_they_were() -> None:
     assert state.sync is not None
     assert received.clock_of(received.clock_value(LINK, state.sync, 5)) == state.sync
     assert received.link_of(received.link_value(link)) == link
+
+
+def test_a_flood_costs_the_log_its_oldest_and_that_is_told() -> None:
+    talk, told = Talk(), list[tuple[object, ...]]()
+    for k in range(MOST + 40):
+        talk.say("SERVO_OUTPUT_RAW", servo1_raw=k)
+    ((_, _, _, _, heard),) = talk.turns(1)
+    kept = [message.fields.get("servo1_raw") for _, message in heard.received]
+    assert (kept, heard.left_out) == (list(range(40, MOST + 40)), 40)
+    received.HeardWriter(lambda *_: None, lambda *line: told.append(line[2:])).write(heard, START_NS)
+    assert any("40 messages that came in are not in the log" in str(line) for line in told)
 
 
 def test_counts_alone_are_told_once_a_second_and_at_the_end() -> None:
