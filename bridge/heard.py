@@ -6,11 +6,11 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from bridge.dialogue import DialogueState
-from bridge.dialogue.timesync import SyncState
+from bridge.dialogue.timesync import TIMESYNC, SyncState
 from bridge.outlet import Outlet
 from bridge.wire import LinkState, Received
 
-LOOK_NS = 200_000_000
+LOOK_NS = 500_000_000
 MOST = 512
 """So many messages of one turn are logged, the newest: a flood must not fill memory while the disk is slow."""
 
@@ -49,8 +49,10 @@ class Hearer:
         came = outlet.received()
         received, left_out = came[-MOST:], max(0, len(came) - MOST)
         due = last or self._due_ns is None or not 0 <= self._due_ns - now_ns <= LOOK_NS
-        if not due and not any(message.message == "TIMESYNC" for _, message in came):
-            return Heard(received, left_out=left_out) if came else NOTHING
+        if not due and not came:
+            return NOTHING
+        if not due and not any(message.message == TIMESYNC for _, message in came):
+            return Heard(received, left_out=left_out)
         states = outlet.link_states()
         far_ends = {link.name: state for link, state in zip(states, outlet.far_ends(), strict=True)}
         clocks = tuple(self._new_clocks(far_ends))
