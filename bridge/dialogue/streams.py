@@ -85,6 +85,10 @@ class StreamKeeper:
         """Whether nothing waits for an answer."""
         return not self._waiting
 
+    def rate_hz(self, name: str) -> float:
+        """Return the rate at which a message is asked for, 0 where it is not [Hz]."""
+        return self._rates_hz.get(name, 0.0)
+
     def take(self, message: Received) -> None:
         """Take a message of the autopilot."""
         if message.message in self._rates_hz:

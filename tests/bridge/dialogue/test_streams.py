@@ -133,3 +133,20 @@ def test_a_bridge_that_keeps_no_log_asks_for_the_attitude_alone() -> None:
             dialogue.take([from_autopilot("COMMAND_ACK", now_ns + 1, command=command, result=ACCEPTED) for _ in wanted])
         assert numbers == {message_id(name) for name in names}
         assert dialogue.state(BASE_NS).streams == ("" if names == {"ATTITUDE"} else "6 of 6 at 50 Hz")
+
+
+def test_the_yaw_watch_does_not_slow_down_the_attitude_that_the_log_wants() -> None:
+    """ArduPilot sends no ATTITUDE while its EKF does not stand; asked again meanwhile, it must not be for less."""
+    dialogue = Dialogue(Terms(streams=Wanted(50.0)))
+    dialogue.take([beat(BASE_NS)])
+    intervals_us: list[float] = []
+    for k in range(400):
+        now_ns = BASE_NS + k * 40_000_000
+        for message in dialogue.due(TrackState.TRACKING, now_ns):
+            if message.name == "COMMAND_LONG" and message.fields["command"] == enum("MAV_CMD_SET_MESSAGE_INTERVAL"):
+                command = message.fields["command"]
+                dialogue.take([from_autopilot("COMMAND_ACK", now_ns + 1, command=command, result=ACCEPTED)])
+                if message.fields["param1"] == float(message_id("ATTITUDE")):
+                    intervals_us.append(float(str(message.fields["param2"])))
+    assert len(intervals_us) > 2
+    assert set(intervals_us) == {20_000.0}
