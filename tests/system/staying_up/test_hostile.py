@@ -14,6 +14,7 @@ from bridge.outlet import Outlet, Spout
 from bridge.pack import Encoder, Identity, Packer, Reader, make_message
 from bridge.signing import Signing
 from bridge.signing.stamps import Stamps
+from tests.bridge.tlogs import frames_in
 from tests.system.staying_up.flight import Flight, Plan
 from tests.system.staying_up.hostile import chunks
 
@@ -40,18 +41,6 @@ def resident_bytes() -> int:
 
 def poses_in(link: MemoryLink) -> int:
     return sum(message.message == "VISION_POSITION_ESTIMATE" for message in Reader().feed(b"".join(link.frames)))
-
-
-def frames_in(tlog: bytes) -> list[bytes]:
-    """Return the frames of a .tlog, which must be whole to its end."""
-    frames, at = [], 0
-    while at < len(tlog):
-        marker, length, flags = tlog[at + 8 : at + 11]
-        size = 8 + length if marker == 0xFE else 12 + length + 13 * (flags & 1)
-        frames.append(tlog[at + 8 : at + 8 + size])
-        assert len(frames[-1]) == size
-        at += 8 + size
-    return frames
 
 
 def test_after_a_million_fuzzed_messages_the_loop_still_sends_every_pose_and_memory_has_not_grown() -> None:
@@ -97,7 +86,10 @@ def test_fuzzed_messages_in_the_log_break_neither_it_nor_its_readers(tmp_path: P
     received = sum(record.topic.startswith("/mavlink/received/") for record in reader.records())
     assert received > 10_000
     assert reader.lost == ()
-    assert len(frames_in(log.with_suffix(".tlog").read_bytes())) == received + len(link.frames)
+    tlog = log.with_suffix(".tlog").read_bytes()
+    frames = frames_in(tlog)
+    assert len(frames) == received + len(link.frames)
+    assert sum(8 + len(frame) for frame in frames) == len(tlog)
 
 
 def test_with_signing_nothing_fuzzed_is_heard_and_the_refused_are_counted(tmp_path: Path) -> None:
