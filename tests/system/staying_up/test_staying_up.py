@@ -13,7 +13,7 @@ import pytest
 from bridge.dialogue import Origin, Terms
 from bridge.dialogue.origin import OriginState
 from bridge.pack import Reader
-from tests.contracts.far_ends import FarEnd, PacedSerialFar, SerialFar, TcpFar, UdpFar
+from tests.contracts.far_ends import FarEnd, PacedSerialFar, SerialFar, TcpFar, UdpCaller, UdpFar
 from tests.system.staying_up.autopilot import StandIn
 from tests.system.staying_up.flight import Flight, Plan, until
 
@@ -82,6 +82,28 @@ def test_a_udp_peer_that_closes_its_port_and_opens_it_again_gets_the_new_poses_a
         assert min(autopilot.poses()) >= back_us
         yield from until(lambda: not flight.stands("link_down"), autopilot.turn)
         assert autopilot.told_origins() == 0
+
+    Flight([(end.uri, TALK)]).fly(plan)
+    end.vanish()
+
+
+def test_an_autopilot_that_calls_from_another_port_after_its_restart_is_answered_there(tmp_path: Path) -> None:
+    end = UdpCaller(tmp_path)
+    autopilot = StandIn(end, calls=True)
+
+    def plan(flight: Flight) -> Plan:
+        yield from until(lambda: settled(flight) and bool(autopilot.poses()), autopilot.turn)
+        end.vanish()
+        yield from until(lambda: "autopilot_silent" in flight.alarms)
+        assert "ArduPilot SILENT" in flight.status_line()
+        end.come_back()
+        autopilot.boot()
+        back_us = monotonic_ns() // 1000
+        yield from until(lambda: settled(flight) and restarts(flight) == 1 and bool(autopilot.poses()), autopilot.turn)
+        assert min(autopilot.poses()) >= back_us
+        assert not flight.stands("autopilot_silent")
+        assert "posebridge: autopilot heard again" in autopilot.texts()
+        assert autopilot.told_origins() == 1
 
     Flight([(end.uri, TALK)]).fly(plan)
     end.vanish()
