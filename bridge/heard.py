@@ -6,11 +6,14 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from bridge.dialogue import DialogueState
-from bridge.dialogue.timesync import SyncState
+from bridge.dialogue.timesync import TIMESYNC, SyncState
 from bridge.outlet import Outlet
 from bridge.wire import LinkState, Received
 
-LOOK_NS = 200_000_000
+LOOK_NS = 500_000_000
+MOST = 512
+"""So many messages of one turn are logged, the newest: a flood must not fill memory while the disk is slow."""
+
 COUNTS_NS = 1_000_000_000
 """Figures that only count are logged no oftener than this; anything else within LOOK_NS of its change."""
 
@@ -19,12 +22,14 @@ class Heard(NamedTuple):
     """What came in by each link, by its URI, and what has changed there.
 
     clocks: time sync after each exchange that changed it.  far_ends: without their clocks.
+    left_out: messages that came and are not in `received`, more having come than a turn may log.
     """
 
     received: tuple[tuple[str, Received], ...] = ()
     clocks: tuple[tuple[str, SyncState], ...] = ()
     far_ends: tuple[tuple[str, DialogueState], ...] = ()
     links: tuple[LinkState, ...] = ()
+    left_out: int = 0
 
 
 NOTHING = Heard()
@@ -41,17 +46,21 @@ class Hearer:
 
     def take(self, outlet: Outlet, now_ns: int, *, last: bool = False) -> Heard:
         """Return what is new at stream time now_ns [ns]; last: nothing comes after this, so counts are told too."""
-        received = outlet.received()
+        came = outlet.received()
+        received, left_out = came[-MOST:], max(0, len(came) - MOST)
         due = last or self._due_ns is None or not 0 <= self._due_ns - now_ns <= LOOK_NS
-        if not due and not any(message.message == "TIMESYNC" for _, message in received):
-            return Heard(received) if received else NOTHING
+        if not due and not came:
+            return NOTHING
+        if not due and not any(message.message == TIMESYNC for _, message in came):
+            return Heard(received, left_out=left_out)
         states = outlet.link_states()
         far_ends = {link.name: state for link, state in zip(states, outlet.far_ends(), strict=True)}
         clocks = tuple(self._new_clocks(far_ends))
         if not due:
-            return Heard(received, clocks)
+            return Heard(received, clocks, left_out=left_out)
         self._due_ns = now_ns + LOOK_NS
-        return Heard(received, clocks, tuple(self._changed(far_ends, now_ns, last)), self._news(states, now_ns, last))
+        changed = tuple(self._changed(far_ends, now_ns, last))
+        return Heard(received, clocks, changed, self._news(states, now_ns, last), left_out)
 
     def _new_clocks(self, far_ends: dict[str, DialogueState]) -> list[tuple[str, SyncState]]:
         new = [

@@ -166,6 +166,8 @@ class Recorder:
             return None if path is None else TlogWriter(path, overwrite)
         except OperatorError:
             self._stream.close()
+            if not overwrite and self._path.is_file():  # begun a moment ago, with nothing in it
+                self._path.unlink()
             raise
 
     def _begin(self) -> LogWriter | None:

@@ -176,7 +176,7 @@ class Dialogue:
             messages += self._origin.due(self.peer, now_ns)
         asked = self._streams.due(self.peer, now_ns)
         if asked is None and self._streams.settled:
-            asked = self._heading.due(self.peer, now_ns)
+            asked = self._heading.due(self.peer, now_ns, self._streams.rate_hz(ATTITUDE))
         if asked is not None:
             messages.append(asked)
         return messages + self._news.due(self._facts(track, now_ns), now_ns)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from bridge.dialogue.peer import Peer
 from bridge.dialogue.yaw_watch import NOTHING, YawReading, YawWatch
 from bridge.pack import enum, make_message, message_id
@@ -31,8 +33,11 @@ class HeadingWatch:
         self.reading: YawReading = NOTHING
 
     def take(self, attitude: Received) -> None:
-        """Take the autopilot's own attitude."""
-        self._watch.take_tilt(attitude.number("roll"), attitude.number("pitch"))
+        """Take the autopilot's own attitude; one without numbers teaches nothing, now or ever."""
+        roll, pitch = attitude.number("roll"), attitude.number("pitch")
+        if not (math.isfinite(roll) and math.isfinite(pitch)):
+            return
+        self._watch.take_tilt(roll, pitch)
         self._tilt_ns = attitude.arrived_ns
 
     def take_pose(self, t_ns: int, v_N: Array, yaw: float, armed: bool, now_ns: int) -> None:
@@ -50,13 +55,17 @@ class HeadingWatch:
             self._look_ns = t_ns
             self.reading = self._watch.reading()
 
-    def due(self, peer: Peer, now_ns: int) -> Message | None:
-        """Return the question for its attitude, while that does not come by itself; None for nothing."""
+    def due(self, peer: Peer, now_ns: int, rate_hz: float = RATE_HZ) -> Message | None:
+        """Return the question for its attitude, while that does not come by itself; None for nothing.
+
+        rate_hz: at which others want it too; no less than RATE_HZ is asked for [Hz].
+        """
         fresh = self._tilt_ns is not None and now_ns - self._tilt_ns <= FRESH_NS
         if fresh or (self._asked_ns is not None and now_ns - self._asked_ns < ASK_NS):
             return None
         self._asked_ns = now_ns
         return make_message(
             "COMMAND_LONG", now_ns, ATTITUDE, target_system=peer.system_id, target_component=peer.component_id,
-            command=enum("MAV_CMD_SET_MESSAGE_INTERVAL"), param1=float(message_id(ATTITUDE)), param2=1e6 / RATE_HZ,
+            command=enum("MAV_CMD_SET_MESSAGE_INTERVAL"), param1=float(message_id(ATTITUDE)),
+            param2=1e6 / max(rate_hz, RATE_HZ),
         )  # fmt: skip

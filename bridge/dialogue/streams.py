@@ -17,6 +17,7 @@ REST_NS = 10_000_000_000  # but not before so long after the last asking
 SHARE = (
     0.5  # of what a serial line carries; the rest is for time sync, parameters and what the ground station asked for
 )
+REFUSED, UNANSWERED = "refused", "not answered"
 SLOW_HZ = 2.0  # what changes slowly, where the line is narrow
 SLOW = ("BATTERY_STATUS",)
 SHARED = ("SERVO_OUTPUT_RAW", "RC_CHANNELS", "ATTITUDE", "LOCAL_POSITION_NED", "BATTERY_STATUS")
@@ -84,16 +85,16 @@ class StreamKeeper:
         """Whether nothing waits for an answer."""
         return not self._waiting
 
+    def rate_hz(self, name: str) -> float:
+        """Return the rate at which a message is asked for, 0 where it is not [Hz]."""
+        return self._rates_hz.get(name, 0.0)
+
     def take(self, message: Received) -> None:
         """Take a message of the autopilot."""
         if message.message in self._rates_hz:
             self._seen_ns[message.message] = message.arrived_ns
-        is_answer = message.message == "COMMAND_ACK" and message.whole("command") == enum(
-            "MAV_CMD_SET_MESSAGE_INTERVAL"
-        )
-        if is_answer and self._asked_ns is not None:
-            accepted = message.whole("result") == enum("MAV_RESULT_ACCEPTED")
-            self._conclude("" if accepted else "refused", message.arrived_ns)
+        if message.message == "COMMAND_ACK" and message.whole("command") == enum("MAV_CMD_SET_MESSAGE_INTERVAL"):
+            self._take_answer(message)
 
     def due(self, peer: Peer, now_ns: int) -> Message | None:
         """Return the question that is due now, None for none."""
@@ -107,7 +108,7 @@ class StreamKeeper:
             if now_ns - self._asked_ns < ANSWER_NS:
                 return None
             if self._tries >= TRIES:
-                self._conclude("not answered", now_ns)
+                self._conclude(UNANSWERED, now_ns)
         if not self._waiting:
             return None
         self._asked_ns = now_ns
@@ -124,9 +125,8 @@ class StreamKeeper:
         if not self._rates_hz:
             return ""
         rate_hz = max(self._rates_hz.values())
-        narrow = (
-            "" if rate_hz >= self._wanted.rate_hz else f" of {self._wanted.rate_hz:g}, all that the line has room for"
-        )
+        full_hz = self._wanted.rate_hz
+        narrow = "" if rate_hz >= full_hz else f" of {full_hz:g}, all that the line has room for"
         troubles = [f"{name} {answer}" for name, answer in self._answers.items() if answer]
         granted = len(self._answers) - len(troubles)
         return ", ".join((f"{granted} of {len(self._rates_hz)} at {rate_hz:.3g} Hz{narrow}", *troubles))
@@ -134,7 +134,7 @@ class StreamKeeper:
     def _take_answer(self, ack: Received) -> None:
         result = ack.whole("result")
         if self._asked_ns is not None and result != enum("MAV_RESULT_IN_PROGRESS"):
-            self._conclude("" if result == enum("MAV_RESULT_ACCEPTED") else "refused", ack.arrived_ns)
+            self._conclude("" if result == enum("MAV_RESULT_ACCEPTED") else REFUSED, ack.arrived_ns)
 
     def _conclude(self, answer: str, now_ns: int) -> None:
         """Enter the answer to the question that stands."""
@@ -142,9 +142,9 @@ class StreamKeeper:
         self._asked_ns, self._tries, self._settled_ns = None, 0, now_ns
 
     def _look_for_silent(self, now_ns: int) -> None:
-        """Ask again for streams that were granted and do not come: a ground station, or a reboot, stopped them."""
+        """Ask again for what does not come and was not refused: a ground station, a reboot or a bad line stopped it."""
         if not self.settled or now_ns - self._settled_ns < REST_NS:
             return
         self._settled_ns = now_ns
-        granted = [name for name, answer in self._answers.items() if not answer]
-        self._waiting = [name for name in granted if now_ns - self._seen_ns.get(name, 0) > SILENT_NS]
+        hoped_for = [name for name, answer in self._answers.items() if answer != REFUSED]
+        self._waiting = [name for name in hoped_for if now_ns - self._seen_ns.get(name, 0) > SILENT_NS]

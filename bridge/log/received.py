@@ -6,6 +6,8 @@ import base64
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from foxglove_schemas_protobuf.Log_pb2 import Log
+
 from bridge.dialogue import DialogueState
 from bridge.dialogue.peer import Autopilot, Peer
 from bridge.dialogue.timesync import SyncState
@@ -13,10 +15,13 @@ from bridge.heard import Heard
 from bridge.log.topics import Schema, Topic, fields_schema, integer, json_topic, number, text
 from bridge.wire import FieldValue, LinkState, Received
 
+STATUSTEXT = "STATUSTEXT"
 RECEIVED_PREFIX = "/mavlink/received/"
 NO_TIME = -1
 CALENDAR_US = 10**15  # MAVLink: a time_usec as large as this is counted from 1970, not from the start
 Put = Callable[[Topic, dict[str, Any], int, int], None]
+Remark = Callable[[int, int, Log.Level.ValueType, str, str], None]
+_ERROR, _WARNING = 3, 4  # MAV_SEVERITY: this and what is worse
 
 
 def _flag(description: str) -> Schema:
@@ -69,11 +74,17 @@ LINK = json_topic(
 
 
 class HeardWriter:
-    """Write what was heard. put: appends a value to a topic, with its log and publish time [ns]."""
+    """Write what was heard.
 
-    def __init__(self, put: Put) -> None:
+    put: appends a value to a topic, with its log and publish time [ns].
+    remark: leaves a line in the log panel: log and publish time [ns], level, whose, the line.
+    """
+
+    def __init__(self, put: Put, remark: Remark) -> None:
         self._put = put
+        self._remark = remark
         self._topics: dict[str, Topic] = {}
+        self._troubles: dict[str, str] = {}
 
     def write(self, heard: Heard, now_ns: int) -> None:
         """Append what one turn of the loop heard."""
@@ -82,12 +93,34 @@ class HeardWriter:
             if topic is None:
                 topic = self._topics[message.message] = received_topic(message)
             self._put(topic, received_value(link, message), now_ns, message.arrived_ns)
+            if message.message == STATUSTEXT:
+                whose = f"system {message.system_id}"
+                self._remark(now_ns, message.arrived_ns, *line_of(message.fields, whose))
+        if heard.left_out:
+            words = f"{heard.left_out} messages that came in are not in the log: more than it takes in one turn"
+            self._remark(now_ns, now_ns, Log.WARNING, "recorder", words)
         for link, sync in heard.clocks:
             self._put(TIMESYNC, clock_value(link, sync, now_ns), now_ns, now_ns)
         for link, state in heard.far_ends:
             self._put(AUTOPILOT, autopilot_value(link, state), now_ns, now_ns)
         for each in heard.links:
             self._put(LINK, link_value(each), now_ns, now_ns)
+            self._tell_of_link(each, now_ns)
+
+    def _tell_of_link(self, link: LinkState, now_ns: int) -> None:
+        """Leave a line when a link goes down, for whatever reason, and when it is up again."""
+        if link.reason != self._troubles.get(link.name, ""):
+            self._troubles[link.name] = link.reason
+            words = f"link down: {link.reason}" if link.reason else "link up again"
+            self._remark(now_ns, now_ns, Log.WARNING if link.reason else Log.INFO, link.name, words)
+
+
+def line_of(fields: Mapping[str, FieldValue], whose: str) -> tuple[Log.Level.ValueType, str, str]:
+    """Return a STATUSTEXT as a line of the log panel: level, whose, text."""
+    severity = fields["severity"]
+    worst = severity if isinstance(severity, int) else 0
+    level = Log.ERROR if worst <= _ERROR else Log.WARNING if worst <= _WARNING else Log.INFO
+    return level, whose, str(fields["text"])
 
 
 def received_topic(message: Received) -> Topic:

@@ -16,7 +16,7 @@ from bridge.log.calibration import CALIBRATION_ATTACHMENT, calibration_json
 from bridge.log.container import Container
 from bridge.log.entry import Entry, encode
 from bridge.log.film import Film, Mark, MarkKind, image_message, mark_value
-from bridge.log.received import HeardWriter
+from bridge.log.received import STATUSTEXT, HeardWriter, line_of
 from bridge.wire import Sent
 from tracker.camera import Camera
 from tracker.rig import Marker
@@ -80,8 +80,8 @@ class LogWriter:
         self._channels: dict[str, Channel] = {}
         self._state: TrackState | None = None
         self._reset_counter: int | None = None
-        self._heard = HeardWriter(self._json)
         self._film_ended = False
+        self._heard = HeardWriter(self._json, self._remark)
         self._begin()
 
     def write(self, entry: Entry) -> None:
@@ -172,6 +172,8 @@ class LogWriter:
         if name not in self._channels:
             self._channels[name] = Channel(self._container, topics.sent_topic(sent.message, sent.fields))
         self._channels[name].put(encode(values.sent_value(sent)), now_ns, sent.t_ns)
+        if sent.message == STATUSTEXT:
+            self._remark(now_ns, sent.t_ns, *line_of(sent.fields, f"to {sent.link}"))
 
     def _write_changes(self, entry: Entry) -> None:
         state = entry.step.state

@@ -20,9 +20,11 @@ if __name__ == "__main__":
     if limit_bytes:
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit_bytes, limit_bytes))
     generator = np.random.default_rng(1)
-    log = recorder(path, capacity=2)
+    wall_ns = 0
+    log = recorder(path, capacity=2, tlog=path.with_suffix(".tlog"), wall_clock=lambda: wall_ns)
     for k in count():
         event, step, sent, now_ns = turn(k, generator)
+        wall_ns = now_ns
         log.take(event, step, sent, now_ns)
         if log.state().error:
             break

@@ -46,14 +46,13 @@ def marker() -> Marker:
 
 def recorder(path: Path, **options: Any) -> Recorder:
     """Return a recorder of that room; nothing is dropped unless the options say so."""
-    chosen: dict[str, Any] = {"block_when_full": True, **options}
+    chosen: dict[str, Any] = {"block_when_full": True, "wall_clock": lambda: WALL_NS, **options}
     return Recorder(
         path,
         attachments={"config.toml": CONFIG},
         metadata={"run": {"source": "recording:somewhere"}, "versions": {"posebridge": "0.1.0"}},
         cameras=cameras(),
         marker=marker(),
-        wall_clock=lambda: WALL_NS,
         **chosen,
     )
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.links import open_link
+from bridge.links import line_bytes_s, open_link
 from bridge.links.uri import Address, parse
 from bridge.pack import Encoder, Identity
 from tests.bridge.estimates import beat
@@ -115,3 +115,18 @@ def test_udpin_sends_nothing_until_it_has_heard_somebody_then_to_the_first_heard
     assert link.state().up
     link.close()
     first.vanish()
+
+
+@pytest.mark.parametrize(
+    ("uri", "bytes_s"),
+    [
+        ("serial:/dev/ttyUSB0:57600", 5760.0),
+        ("serial:/dev/serial/by-path/pci-0:1:921600", 92160.0),
+        ("udpout:127.0.0.1:14550", None),
+        ("tcp:127.0.0.1:5760", None),
+        ("memory:a", None),
+        ("serial:/dev/ttyUSB0:fast", None),
+    ],
+)
+def test_a_serial_line_carries_a_tenth_of_its_baud_in_bytes(uri: str, bytes_s: float | None) -> None:
+    assert line_bytes_s(uri) == bytes_s

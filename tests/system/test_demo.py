@@ -5,15 +5,18 @@ from __future__ import annotations
 import io
 import itertools
 import json
+from collections import Counter
 
 import cv2
 import pytest
 from rich.console import Console
 
+from bridge.log.reader import LogReader
 from tools.demo import LOG, PLOT, SUMMARY, VERDICT, DemoResult, run_demo
 from tools.request import Clocks, DemoRequest, Pace
 
 DURATION_S = 16.0
+FRAME_NS = 66_666_667 * 3 // 2
 
 
 @pytest.fixture(scope="module")
@@ -43,3 +46,15 @@ def test_log_summary_verdict_and_picture_lie_in_the_folder(result: DemoResult) -
     picture = cv2.imread(str(result.out / PLOT))
     assert picture is not None
     assert picture.shape[1] > 1000
+
+
+def test_the_log_holds_what_the_autopilot_was_asked_to_tell_and_how_to_align_its_clock(result: DemoResult) -> None:
+    records = list(LogReader(result.out / LOG).records())
+    counts = Counter(record.topic for record in records)
+    for name in ("SERVO_OUTPUT_RAW", "RC_CHANNELS", "ATTITUDE", "LOCAL_POSITION_NED", "RAW_IMU"):
+        assert counts[f"/mavlink/received/{name}"] > 40 * DURATION_S
+    offset_ns = [record.value["offset_ns"] for record in records if record.topic == "/timesync"][-1]
+    attitudes = [record.value for record in records if record.topic == "/mavlink/received/ATTITUDE"]
+    late_ns = [value["arrived_ns"] - value["autopilot_ns"] - offset_ns for value in attitudes]
+    assert max(map(abs, late_ns)) < FRAME_NS  # time stands still between two frames of the cameras
+    assert (result.out / LOG).with_suffix(".tlog").stat().st_size > 100_000

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from bridge.log.reader import LogReader
 from tests.bridge.mavlink_by_hand import parse
+from tests.bridge.tlogs import frames_in
 from tests.system.recordings import ROOT, command
 
 SECOND_US = 1_000_000
@@ -33,6 +34,9 @@ def test_a_killed_run_can_be_exported_up_to_its_last_second(lab_flight: Path, tm
     logged = [base64.b64decode(record.value["raw"]) for record in reader.records() if "/sent/" in record.topic]
     assert len(logged) >= 60
     assert b"".join(sent).startswith(b"".join(logged))
+    tlog = b"".join(frames_in(log.with_suffix(".tlog").read_bytes()))
+    assert b"".join(sent).startswith(tlog)
+    assert expected_us[-1] - poses_us(tlog)[-1] <= SECOND_US
     assert reader.lost, "a log without an end must say so"
 
 

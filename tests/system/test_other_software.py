@@ -26,6 +26,7 @@ from bridge.outlet import open_outlet
 from bridge.pack import MESSAGES
 from bridge.wire import Sent
 from tests.bridge.estimates import estimate, random_covariance, step
+from tests.bridge.tlogs import frames_in
 from tracker import so3
 
 HOST = "127.0.0.1"
@@ -127,19 +128,10 @@ def test_mavproxy_reads_what_was_sent(mavproxy: None, tmp_path: Path) -> None:
         sent = fly_until(port, lambda: counts_enough(messages_in(lines)) and bool(vehicles_in(lines)))
     assert_read_as_sent(messages_in(lines), sent)
     assert vehicles_in(lines) == {(VEHICLE, COMPONENT)}
-    frames = [frame for frame in frames_of(log.read_bytes()) if frame[5:7] == bytes((VEHICLE, COMPONENT))]
+    frames = [frame for frame in frames_in(log.read_bytes()) if frame[5:7] == bytes((VEHICLE, COMPONENT))]
     raw = {each.raw for each in sent.values()}
     assert len(frames) > ENOUGH
     assert all(frame in raw for frame in frames)
-
-
-def frames_of(tlog: bytes) -> Iterator[bytes]:
-    """Yield the whole frames in a .tlog: eight bytes of time before each."""
-    at = 8
-    while at + 12 <= len(tlog) and at + 12 + tlog[at + 1] <= len(tlog):
-        length = 12 + tlog[at + 1]
-        yield tlog[at : at + length]
-        at += length + 8
 
 
 def test_mavsdk_reads_what_was_sent(mavsdk: Any) -> None:

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 import base64
 import json
+import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
 
+from bridge.dialogue.streams import Wanted
 from bridge.log.reader import LogReader
 from bridge.settings import Settings, load_settings
+from bridge.settings.terms import terms_of
 from tests.system.recordings import short_copy
 from tools.request import Clocks, Pace, RunRequest
-from tools.session import run_session
+from tools.session import run_session, tlog_beside
 from tracker.errors import OperatorError
 from tracker.sources.groundtruth import read_ground_truth
 
@@ -147,3 +150,18 @@ def test_a_run_without_log_and_summary_writes_nothing(
     request = RunRequest(settings("paper"), f"recording:{recording}", None, Pace.FAST, None, False, True)
     run_session(request, Time().clocks())
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_tlog_lies_beside_the_log_but_a_pipe_gets_none(tmp_path: Path) -> None:
+    assert tlog_beside(tmp_path / "flight.mcap") == tmp_path / "flight.tlog"
+    os.mkfifo(tmp_path / "pipe")
+    assert tlog_beside(tmp_path / "pipe") is None
+    with pytest.raises(OperatorError, match=r"a \.tlog is written beside the MCAP log; name it .*flight\.mcap"):
+        tlog_beside(tmp_path / "flight.tlog")
+
+
+@pytest.mark.parametrize("logged", [True, False])
+def test_the_autopilot_is_asked_for_streams_only_when_a_log_is_kept(logged: bool) -> None:
+    lab = load_settings("lab").with_links(("udpout:127.0.0.1:9", "serial:/dev/ttyUSB0:57600"))
+    streams = [terms.streams for _, terms in terms_of(lab, logged=logged)]
+    assert streams == [Wanted(50.0 * logged), Wanted(50.0 * logged, 5760.0)]

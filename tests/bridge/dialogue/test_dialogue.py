@@ -11,6 +11,7 @@ from bridge.dialogue import PROFILES, Dialogue, Origin, Terms
 from bridge.dialogue.news import Facts, News
 from bridge.dialogue.origin import OriginState
 from bridge.dialogue.peer import Autopilot
+from bridge.dialogue.streams import Wanted
 from bridge.wire import Message
 from tests.bridge.dialogue.far_autopilot import BASE_NS, beat, from_autopilot, reply
 from tests.bridge.estimates import estimate
@@ -223,3 +224,15 @@ def test_what_is_known_of_the_far_end_is_told_in_a_line_and_in_a_word() -> None:
         "1 too old"
     )
     assert dialogue.state(now_ns + 5_000_000_000).brief == "ArduPilot SILENT"
+
+
+def test_a_full_link_and_what_was_asked_for_stand_in_the_far_ends_line() -> None:
+    dialogue = met("PX4", Terms(streams=Wanted(50.0, 5760.0)))
+    for k in range(40):
+        dialogue.due(TrackState.TRACKING, BASE_NS + k * 20_000_000, superseded=k)
+    state = dialogue.state(BASE_NS)
+    assert state.full
+    assert state.brief == "PX4, LINK FULL"
+    assert "LINK FULL: only the newest poses go, at the rate that fits" in str(state)
+    assert "its streams: 0 of 6 at" in str(state)
+    assert "all that the line has room for" in str(state)

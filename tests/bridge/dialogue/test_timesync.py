@@ -110,13 +110,30 @@ def test_one_wild_reply_changes_nothing_and_six_in_a_row_are_believed() -> None:
     assert known(sync).restarts == 1
 
 
+def asked(sync: TimeSync, start_ns: int, rtt_ns: int | None) -> int:
+    """Let a second pass; return how many requests came. rtt_ns: round trip of their answers, None for no answers."""
+    count = 0
+    for t_ns in range(start_ns, start_ns + 1_000_000_000, 1_000_000):
+        request = sync.request(t_ns)
+        count += request is not None
+        if request is not None and rtt_ns is not None:
+            sync.take(reply(request, t_ns + rtt_ns, t_ns))
+    return count
+
+
 def test_requests_come_quickly_until_converged_and_then_five_a_second() -> None:
+    assert asked(TimeSync(), BASE_NS, 2_000_000) == 50
     sync = TimeSync()
-    times = [BASE_NS + k * 1_000_000 for k in range(1000)]
-    assert sum(sync.request(t_ns) is not None for t_ns in times) == 50
     exchange(sync, CONVERGED_SAMPLES + 1, start_ns=2 * BASE_NS, offset_ns=1e9)
-    times = [20 * BASE_NS + k * 1_000_000 for k in range(1000)]
-    assert sum(sync.request(t_ns) is not None for t_ns in times) == 5
+    assert asked(sync, 20 * BASE_NS, None) == 5
+
+
+@pytest.mark.parametrize("rtt_ns", [None, 12_000_000], ids=["silence", "57600 baud"])
+def test_a_line_whose_answers_are_of_no_use_is_soon_asked_five_times_a_second_only(rtt_ns: int | None) -> None:
+    sync = TimeSync()
+    asked(sync, BASE_NS, rtt_ns)
+    assert asked(sync, 2 * BASE_NS, rtt_ns) == 5
+    assert asked(sync, 3 * BASE_NS, 2_000_000) > 40
 
 
 def test_another_ones_request_is_answered_with_its_arrival_in_our_clock() -> None:

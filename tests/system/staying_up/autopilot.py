@@ -15,10 +15,11 @@ ORIGIN: Mapping[str, FieldValue] = {"latitude": 321_000_000, "longitude": 348_00
 
 
 class StandIn:
-    """One autopilot. heard, bytes_came: all that came in since its start."""
+    """One autopilot. heard, bytes_came: all that came in since its start.  calls: whether it speaks first."""
 
-    def __init__(self, end: FarEnd, system_id: int = 1) -> None:
+    def __init__(self, end: FarEnd, system_id: int = 1, *, calls: bool = False) -> None:
         self._end = end
+        self._calls = calls
         self._encode = Encoder(Identity(system_id, 1))
         self._sequence = 0
         self._beat_ns, self._beat_every_ns = 0, BEAT_NS
@@ -49,7 +50,7 @@ class StandIn:
                 self.heard.append(message)
                 for reply in self._replies(message):
                     self.say(reply)
-        if self.heard and monotonic_ns() - self._beat_ns > self._beat_every_ns:
+        if (self.heard or self._calls) and monotonic_ns() - self._beat_ns > self._beat_every_ns:
             self._beat_ns = monotonic_ns()
             self.say(make_message("HEARTBEAT", 0, type=enum("MAV_TYPE_HELICOPTER"), autopilot=3))
 

@@ -50,15 +50,15 @@ class Flight:
     alarms: names of all that were raised.  frames_us: stamps of the frames.
     """
 
-    links: Sequence[tuple[str, Terms]]
+    links: Sequence[tuple[str, Terms]] = ()
     log: Path | None = None
     rate_hz: float = 100.0
     alarms: set[str] = field(default_factory=set, init=False)
     frames_us: list[int] = field(default_factory=list, init=False)
 
-    def fly(self, plan: Callable[[Flight], Plan]) -> None:
-        """Run the loop until the plan has come to its end."""
-        outlet = open_outlet(self.links, component_id=197, room_yaw_deg=0.0, stopwatch=perf_counter_ns)
+    def fly(self, plan: Callable[[Flight], Plan], outlet: Outlet | None = None) -> None:
+        """Run the loop until the plan has come to its end; outlet: in place of one with the flight's links."""
+        outlet = outlet or open_outlet(self.links, component_id=197, room_yaw_deg=0.0, stopwatch=perf_counter_ns)
         monitor = Monitor(NAMES.cameras)
         self.telemetry = Telemetry(About("test"), NAMES, Limits(), monitor, None, perf_counter_ns)
         log = None if self.log is None else recorder(self.log, tlog=self.log.with_suffix(".tlog"))

@@ -9,6 +9,7 @@ from tools.simulate.autopilot.parameters import FOR_VISION
 
 ACCEPTED, UNSUPPORTED, FAILED = 0, 3, 4
 ARM, REBOOT, SET_INTERVAL = 400, 246, 511
+SERVOS, RADIO, BATTERY = 36, 65, 147
 LOCAL_POSITION, EKF_STATUS, ORIGIN, GLOBAL_POSITION, VERSION = 32, 193, 49, 33, 148
 
 
@@ -157,6 +158,21 @@ def test_a_message_comes_at_the_rate_asked_for_until_it_is_stopped() -> None:
         assert talk.command(SET_INTERVAL, 12345, 100_000) == FAILED
     assert 20 <= count <= 22
     assert later <= count + 1
+
+
+def test_servos_and_radio_are_told_and_a_battery_it_does_not_have_is_known_and_silent() -> None:
+    with Conversation() as talk:
+        for number in (SERVOS, RADIO, BATTERY):
+            assert talk.command(SET_INTERVAL, number, 20_000) == ACCEPTED
+        talk.wait(2.0)
+        servos = [each.fields for each in talk.heard if each.message == "SERVO_OUTPUT_RAW"]
+        kinds = {each.message for each in talk.heard}
+    assert len(servos) > 40
+    assert {name: servos[-1][name] for name in ("servo1_raw", "servo3_raw", "servo9_raw")} == {
+        "servo1_raw": 1500, "servo3_raw": 1500, "servo9_raw": 0,
+    }  # fmt: skip
+    assert "RC_CHANNELS" in kinds
+    assert "BATTERY_STATUS" not in kinds
 
 
 def test_its_version_can_be_asked_and_an_unknown_command_is_called_unsupported() -> None:
