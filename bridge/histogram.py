@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -36,22 +37,16 @@ class Histogram:
         self._fold()
         if self._count == 0:
             return NO_SAMPLES
-        p50, p95, p99 = (self._quantile_ms(share) for share in (0.50, 0.95, 0.99))
+        needed = [math.ceil(share * self._count) for share in (0.50, 0.95, 0.99)]
+        places = self._bins.cumsum().searchsorted(needed).tolist()
+        p50, p95, p99 = (min(LEAST_NS * 10 ** (place / BINS_PER_DECADE), self._max_ns) / 1e6 for place in places)
         return Percentiles(self._count, p50, p95, p99, self._max_ns / 1e6)
 
     def coarse(self, edges_ns: tuple[int, ...]) -> tuple[int, ...]:
         """Return how many samples lie below the first edge, between each two, and above the last; edges rising [ns]."""
         self._fold()
-        total = np.append(0, np.cumsum(self._bins))
-        places = [math.ceil(BINS_PER_DECADE * math.log10(edge / LEAST_NS) - 0.5) for edge in edges_ns]
-        below = [int(total[min(max(place, 0), BINS)]) for place in places]
-        return tuple(b - a for a, b in pairwise((0, *below, self._count)))
-
-    def _quantile_ms(self, share: float) -> float:
-        """Return the duration that `share` of the samples do not exceed [ms]."""
-        needed = math.ceil(share * self._count)
-        place = int(np.searchsorted(np.cumsum(self._bins), needed))
-        return float(min(LEAST_NS * 10 ** (place / BINS_PER_DECADE), self._max_ns) / 1e6)
+        below = [0, *np.append(0, self._bins.cumsum())[_places(edges_ns)].tolist(), self._count]
+        return tuple(b - a for a, b in pairwise(below))
 
     def _fold(self) -> None:
         """Count what waits."""
@@ -63,3 +58,10 @@ class Histogram:
         places = np.rint(BINS_PER_DECADE * np.log10(ratios)).astype(np.int64)
         self._bins += np.bincount(np.minimum(places, BINS - 1), minlength=BINS)
         self._waiting.clear()
+
+
+@cache
+def _places(edges_ns: tuple[int, ...]) -> list[int]:
+    """Return how many bins lie below each edge [ns]."""
+    places = (math.ceil(BINS_PER_DECADE * math.log10(edge / LEAST_NS) - 0.5) for edge in edges_ns)
+    return [min(max(place, 0), BINS) for place in places]

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections import Counter, deque
+from collections import Counter, defaultdict, deque
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from bridge.alarms import Alarm
 from bridge.dialogue import DialogueState
@@ -16,6 +17,18 @@ from tracker.types import Estimate, Event, Frame, Step, TrackState
 RATE_WINDOW_NS = 2_000_000_000
 SEND = "send"
 TOTAL = "frame to datagram"
+
+
+@dataclass(frozen=True, slots=True)
+class Tally:
+    """What a run's turns come to, counted: see the fields of these names in `bridge.summary.Summary`."""
+
+    estimates_sent: int
+    rate_hz: float
+    frames: Mapping[str, int]
+    rejected: Mapping[str, int]
+    lost: int
+    resets: int
 
 
 class Monitor:
@@ -31,7 +44,7 @@ class Monitor:
         self._rejected: Counter[str] = Counter()
         self.last_rejection = ""
         self._latency = Histogram()
-        self._stages: dict[str, Histogram] = {}
+        self._stages: defaultdict[str, Histogram] = defaultdict(Histogram)
         self._recent: deque[int] = deque()
         self._count = 0
         self._first_ns: int | None = None
@@ -53,10 +66,12 @@ class Monitor:
         self.state = step.state
         for estimate in step.estimates:
             self._take_estimate(estimate)
+        newest_ns = None if self._newest is None else self._newest.t_ns
         for record in sent:
             if record.available_ns:
                 self._latency.add(record.sent_ns - record.available_ns)
-                self._take_sending(record)
+                if record.t_ns == newest_ns:  # the last stage: from the estimate's end to the kernel's taking it
+                    self._stages[SEND].add(record.sent_ns - self._ready_ns)
 
     def _take_estimate(self, estimate: Estimate) -> None:
         if self._newest is None:
@@ -68,21 +83,11 @@ class Monitor:
         self._newest = estimate
         self._count += 1
         for name, duration_ns in estimate.stages_ns.items():
-            self._stage(name).add(duration_ns)
+            self._stages[name].add(duration_ns)
         self._ready_ns = estimate.available_ns + sum(estimate.stages_ns.values())
         self._recent.append(estimate.t_ns)
         while estimate.t_ns - self._recent[0] > RATE_WINDOW_NS:
             self._recent.popleft()
-
-    def _take_sending(self, record: Sent) -> None:
-        """Time the last stage: from the estimate's end to the kernel's taking its message."""
-        if self._newest is not None and record.t_ns == self._newest.t_ns:
-            self._stage(SEND).add(record.sent_ns - self._ready_ns)
-
-    def _stage(self, name: str) -> Histogram:
-        if name not in self._stages:
-            self._stages[name] = Histogram()
-        return self._stages[name]
 
     def durations(self) -> Mapping[str, Histogram]:
         """Return every stage by name, in order, and from frame to datagram under `TOTAL`."""
@@ -122,21 +127,33 @@ class Monitor:
         offsets = zip(self._names, estimate.clock_offsets_s, estimate.clock_sigmas_s, strict=False)
         return {name: ClockOffset(1e3 * float(offset), 1e3 * float(sigma)) for name, offset, sigma in [*offsets][1:]}
 
-    def summary(
-        self, links: tuple[LinkState, ...], log: LogSummary | None, far_ends: tuple[DialogueState, ...] = ()
-    ) -> Summary:
-        """Return the figures of the run so far."""
+    def tally(self) -> Tally:
+        """Return what was counted so far; without percentiles, so it costs little."""
         lasted_ns = 0 if self._newest is None or self._first_ns is None else self._newest.t_ns - self._first_ns
-        return Summary(
+        return Tally(
             estimates_sent=self._count,
             rate_hz=_rate_hz(self._count, lasted_ns),
-            latency_ms=self._latency.percentiles(),
-            stages_ms={name: histogram.percentiles() for name, histogram in self._stages.items()},
-            worst_gap_ms=None if self._worst_gap_ns is None else self._worst_gap_ns / 1e6,
             frames={name: self._frames[index] for index, name in enumerate(self._names)},
             rejected=dict(sorted(self._rejected.items())),
             lost=self._lost,
             resets=self._resets,
+        )
+
+    def summary(
+        self, links: tuple[LinkState, ...], log: LogSummary | None, far_ends: tuple[DialogueState, ...] = ()
+    ) -> Summary:
+        """Return the figures of the run so far."""
+        tally = self.tally()
+        return Summary(
+            estimates_sent=tally.estimates_sent,
+            rate_hz=tally.rate_hz,
+            latency_ms=self._latency.percentiles(),
+            stages_ms={name: histogram.percentiles() for name, histogram in self._stages.items()},
+            worst_gap_ms=None if self._worst_gap_ns is None else self._worst_gap_ns / 1e6,
+            frames=tally.frames,
+            rejected=tally.rejected,
+            lost=tally.lost,
+            resets=tally.resets,
             clocks=self._clocks(self._newest),
             links=links,
             far_ends=far_ends,

@@ -6,13 +6,12 @@ Frames here: N is north-east-down with its origin in the room's, F the body's fo
 from __future__ import annotations
 
 import math
-import struct
-from dataclasses import dataclass
+from itertools import accumulate, pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker import so3
 from tracker.compiled import compiled
 from tracker.errors import OperatorError
 from tracker.types import Array, Estimate, frozen_array
@@ -24,46 +23,32 @@ _FLIP = (1.0, -1.0, -1.0)
 # Euler angles end at pitch +/-90 deg. Beyond 89.4 deg their covariance stays at its value there: already "unknown"
 # to any filter, and still positive definite in 32-bit floats, which resolve 1 - rho^2 = cos(pitch)^2 no further.
 _MIN_COS_PITCH = 0.01
-_TWIST_FLOAT32 = struct.Struct("<27f")
-_UPPER = np.triu_indices(6)
 _POLE = 1.0 - 1e-12  # as `so3.to_euler`
+_LENGTHS = (3, 3, 4, 21, 3, 9, 3, 3, 21)  # of a `NedState`'s lists
+_PARTS = tuple(slice(a, b) for a, b in pairwise(accumulate(_LENGTHS, initial=0)))
 _READ_ONLY = "Array(f8, 2, 'A', readonly=True)"
 _READ_ONLY_1D = "Array(f8, 1, 'A', readonly=True)"
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class NedPose:
-    """An estimate's pose as autopilots read it; every float is exact in 32 bits.
+class NedState(NamedTuple):  # made for each estimate: a tuple costs a quarter of a dataclass
+    """An estimate as autopilots read it; every float is exact in 32 bits.
 
     p_BinN: x y z [m].  euler: roll pitch yaw of F in N, Z-Y-X [rad].  q_FtoN: Hamilton w x y z, unit length.
-    covariance: row-major upper triangle, 21 long, of the (6, 6) covariance of x y z roll pitch yaw [m, rad].
+    pose_covariance: row-major upper triangle, 21 long, of the (6, 6) covariance of x y z roll pitch yaw [m, rad].
+    v_BinN: [m/s].  v_covariance: its covariance in N, row-major (3, 3), 9 long [m^2/s^2].
+    v_BinF: [m/s].  w_BinF: [rad/s].
+    twist_covariance: row-major upper triangle, 21 long, of the (6, 6) covariance of the last two.
     """
 
     p_BinN: list[float]
     euler: list[float]
     q_FtoN: list[float]
-    covariance: list[float]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class NedVelocity:
-    """An estimate's velocity. v_BinN: [m/s]. covariance: row-major (3, 3), 9 long [m^2/s^2]; exact in 32 bits."""
-
+    pose_covariance: list[float]
     v_BinN: list[float]
-    covariance: list[float]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class NedTwist:
-    """An estimate's motion in the body's own axes; every float is exact in 32 bits.
-
-    v_BinF: [m/s].  w_BinF: [rad/s].
-    covariance: row-major upper triangle, 21 long, of the (6, 6) covariance of both.
-    """
-
+    v_covariance: list[float]
     v_BinF: list[float]
     w_BinF: list[float]
-    covariance: list[float]
+    twist_covariance: list[float]
 
 
 class NedFrame:
@@ -77,34 +62,12 @@ class NedFrame:
             raise OperatorError(f"room_yaw_deg: {room_yaw_deg} deg must be a finite number; measure the room's x axis")
         self.R_WtoN = rotation_from_room(math.radians(room_yaw_deg))
 
-    def pose(self, estimate: Estimate) -> NedPose:
-        """Turn an estimate's pose and the pose part of its covariance."""
-        values = _turned_pose(self.R_WtoN, estimate.p_BinW, estimate.R_BtoW, estimate.covariance).tolist()
-        return NedPose(values[:3], values[3:6], values[6:10], values[10:])
-
-    def velocity(self, estimate: Estimate) -> NedVelocity:
-        """Turn an estimate's velocity and its covariance."""
-        values = _turned_velocity(self.R_WtoN, estimate.v_BinW, estimate.covariance).tolist()
-        return NedVelocity(values[:3], values[3:])
-
-    def twist(self, estimate: Estimate) -> NedTwist:
-        """Turn an estimate's velocity and rate into F, with their covariance.
-
-        Derivation: v_B = R_BtoW' v. With R_BtoW = R_hat exp(theta) it changes by [v_B]x theta for an attitude error and
-        by R_hat' dv for a velocity error; the rate is the body's already. F is B with y and z turned about.
-        """
-        R_WtoB = estimate.R_BtoW.T
-        v_B = R_WtoB @ estimate.v_BinW
-        J = np.zeros((6, 12))
-        J[:3, 3:6] = so3.hat(v_B)
-        J[:3, 6:9] = R_WtoB
-        J[3:, 9:] = np.eye(3)
-        J *= np.tile(_FLIP, 2)[:, None]
-        covariance = J @ estimate.covariance @ J.T
-        flip = np.array(_FLIP)
-        values = (flip * v_B).tolist() + (flip * estimate.w_BinB).tolist() + covariance[_UPPER].tolist()
-        rounded = _TWIST_FLOAT32.unpack(_TWIST_FLOAT32.pack(*values))
-        return NedTwist(list(rounded[:3]), list(rounded[3:6]), list(rounded[6:]))
+    def turn(self, estimate: Estimate) -> NedState:
+        """Turn an estimate and its covariance."""
+        values = _turned(
+            self.R_WtoN, estimate.p_BinW, estimate.R_BtoW, estimate.v_BinW, estimate.w_BinB, estimate.covariance
+        ).tolist()
+        return NedState(*[values[part] for part in _PARTS])
 
 
 def rotation_from_room(room_yaw: float) -> Array:
@@ -139,17 +102,18 @@ def pose_jacobian(R_WtoN: Array, roll: float, pitch: float) -> Array:
 
 @compiled(f"f8[::1]({_READ_ONLY}, {_READ_ONLY})")
 def turned_triangle(J: Array, covariance: Array) -> Array:
-    """Return the upper triangle (21,), row by row, of J C J' for J (6, 6) and the first six of C's rows and columns."""
-    half = np.zeros((6, 6))
+    """Return the upper triangle (21,), row by row, of J C J' for J (6, n) and the first n of C's rows and columns."""
+    count = J.shape[1]
+    half = np.zeros((6, count))
     for i in range(6):
-        for k in range(6):
-            for j in range(6):
+        for k in range(count):
+            for j in range(count):
                 half[i, j] += J[i, k] * covariance[k, j]
     triangle = np.zeros(21)
     place = 0
     for i in range(6):
         for j in range(i, 6):
-            for k in range(6):
+            for k in range(count):
                 triangle[place] += half[i, k] * J[j, k]
             place += 1
     return triangle
@@ -202,4 +166,37 @@ def _turned_velocity(R_WtoN: Array, v_BinW: Array, covariance: Array) -> Floats:
                 for m in range(3):
                     total += R_WtoN[i, k] * covariance[6 + k, 6 + m] * R_WtoN[j, m]
             out[3 + 3 * i + j] = total
+    return out
+
+
+@compiled(f"f4[::1]({_READ_ONLY}, {_READ_ONLY_1D}, {_READ_ONLY_1D}, {_READ_ONLY})")
+def _turned_twist(R_BtoW: Array, v_BinW: Array, w_BinB: Array, covariance: Array) -> Floats:
+    """Return velocity and rate in F and their covariance's upper triangle, (27,).
+
+    Derivation: v_B = R_BtoW' v. With R_BtoW = R_hat exp(theta) it changes by [v_B]x theta for an attitude error and
+    by R_hat' dv for a velocity error; the rate is the body's already. F is B with y and z turned about.
+    """
+    out = np.zeros(27, np.float32)
+    v = np.zeros(3)
+    J = np.zeros((6, 9))  # by the errors of attitude, velocity and rate
+    for i in range(3):
+        for k in range(3):
+            v[i] += R_BtoW[k, i] * v_BinW[k]
+            J[i, 3 + k] = _FLIP[i] * R_BtoW[k, i]
+        J[3 + i, 6 + i] = _FLIP[i]
+        out[i], out[3 + i] = _FLIP[i] * v[i], _FLIP[i] * w_BinB[i]
+    J[0, 1], J[0, 2] = -v[2], v[1]
+    J[1, 0], J[1, 2] = -v[2], v[0]
+    J[2, 0], J[2, 1] = v[1], -v[0]
+    out[6:] = turned_triangle(J, covariance[3:, 3:])
+    return out
+
+
+@compiled(f"f4[::1]({_READ_ONLY}, {_READ_ONLY_1D}, {_READ_ONLY}, {_READ_ONLY_1D}, {_READ_ONLY_1D}, {_READ_ONLY})")
+def _turned(R_WtoN: Array, p_BinW: Array, R_BtoW: Array, v_BinW: Array, w_BinB: Array, covariance: Array) -> Floats:
+    """Return everything of a `NedState` in its order, (70,)."""
+    out = np.empty(70, np.float32)
+    out[:31] = _turned_pose(R_WtoN, p_BinW, R_BtoW, covariance)
+    out[31:43] = _turned_velocity(R_WtoN, v_BinW, covariance)
+    out[43:] = _turned_twist(R_BtoW, v_BinW, w_BinB, covariance)
     return out

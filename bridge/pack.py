@@ -10,15 +10,16 @@ from dataclasses import dataclass
 from functools import cache
 from operator import itemgetter
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from fastcrc.crc16 import mcrf4xx
 
 # The v20 dialect always frames MAVLink 2; mavutil would look at the environment and may cut the extension fields.
 # ArduPilot's dialect holds the common one, and its own EKF_STATUS_REPORT.
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from bridge.ned import NedFrame, NedPose, NedTwist, NedVelocity
+from bridge.ned import NedFrame, NedState
 from bridge.signing.signature import SIGNED, Signing
 from bridge.wire import FieldValue, Message, Received
 from tracker.errors import OperatorError
@@ -32,6 +33,8 @@ WORTHLESS_M = 0.1  # one sigma at which a position has no quality left
 _HEAD = struct.Struct("<BBBBBBHB")  # of a MAVLink 2 frame, behind the marker
 _MARKER = re.compile(rb"[\xfd\xfe]")
 _CLASSES = {dialect_class.msgname: dialect_class for dialect_class in dialect.mavlink_map.values()}
+_LOCAL_FRD, _BODY_FRD = int(dialect.MAV_FRAME_LOCAL_FRD), int(dialect.MAV_FRAME_BODY_FRD)
+_VISION = int(dialect.MAV_ESTIMATOR_TYPE_VISION)
 _HEARTBEAT_FIELDS = MappingProxyType(
     {
         "type": int(dialect.MAV_TYPE_ONBOARD_CONTROLLER),
@@ -65,9 +68,9 @@ class Identity:
             raise OperatorError(f"component_id: {self.component_id} must be 1 to 255; 197 is the usual one")
 
 
-def _vision_position(estimate: Estimate, pose: NedPose) -> Fields:
-    x, y, z = pose.p_BinN
-    roll, pitch, yaw = pose.euler
+def _vision_position(estimate: Estimate, ned: NedState) -> Fields:
+    x, y, z = ned.p_BinN
+    roll, pitch, yaw = ned.euler
     return {
         "usec": estimate.t_ns // 1000,
         "x": x,
@@ -76,79 +79,80 @@ def _vision_position(estimate: Estimate, pose: NedPose) -> Fields:
         "roll": roll,
         "pitch": pitch,
         "yaw": yaw,
-        "covariance": pose.covariance,
+        "covariance": ned.pose_covariance,
         "reset_counter": estimate.reset_counter,
     }
 
 
-def _att_pos_mocap(estimate: Estimate, pose: NedPose) -> Fields:
-    x, y, z = pose.p_BinN
+def _att_pos_mocap(estimate: Estimate, ned: NedState) -> Fields:
+    x, y, z = ned.p_BinN
     return {
         "time_usec": estimate.t_ns // 1000,
-        "q": pose.q_FtoN,
+        "q": ned.q_FtoN,
         "x": x,
         "y": y,
         "z": z,
-        "covariance": pose.covariance,
+        "covariance": ned.pose_covariance,
     }
 
 
-def _vision_speed(estimate: Estimate, velocity: NedVelocity) -> Fields:
-    x, y, z = velocity.v_BinN
+def _vision_speed(estimate: Estimate, ned: NedState) -> Fields:
+    x, y, z = ned.v_BinN
     return {
         "usec": estimate.t_ns // 1000,
         "x": x,
         "y": y,
         "z": z,
-        "covariance": velocity.covariance,
+        "covariance": ned.v_covariance,
         "reset_counter": estimate.reset_counter,
     }
 
 
-def _odometry(estimate: Estimate, pose: NedPose, twist: NedTwist) -> Fields:
+def _odometry(estimate: Estimate, ned: NedState) -> Fields:
     """Fill ODOMETRY with the one pair of frames that ArduPilot takes and PX4 takes as well.
 
     PX4 never reads the estimator type MOCAP.  quality: 100 at no uncertainty, 1 from 10 cm of one sigma on.
     """
-    x, y, z = pose.p_BinN
-    vx, vy, vz = twist.v_BinF
-    roll_rate, pitch_rate, yaw_rate = twist.w_BinF
+    x, y, z = ned.p_BinN
+    vx, vy, vz = ned.v_BinF
+    roll_rate, pitch_rate, yaw_rate = ned.w_BinF
     return {
         "time_usec": estimate.t_ns // 1000,
-        "frame_id": int(dialect.MAV_FRAME_LOCAL_FRD),
-        "child_frame_id": int(dialect.MAV_FRAME_BODY_FRD),
+        "frame_id": _LOCAL_FRD,
+        "child_frame_id": _BODY_FRD,
         "x": x,
         "y": y,
         "z": z,
-        "q": pose.q_FtoN,
+        "q": ned.q_FtoN,
         "vx": vx,
         "vy": vy,
         "vz": vz,
         "rollspeed": roll_rate,
         "pitchspeed": pitch_rate,
         "yawspeed": yaw_rate,
-        "pose_covariance": pose.covariance,
-        "velocity_covariance": twist.covariance,
+        "pose_covariance": ned.pose_covariance,
+        "velocity_covariance": ned.twist_covariance,
         "reset_counter": estimate.reset_counter,
-        "estimator_type": int(dialect.MAV_ESTIMATOR_TYPE_VISION),
+        "estimator_type": _VISION,
         "quality": _quality(estimate),
     }
 
 
 def _quality(estimate: Estimate) -> int:
     """Return MAVLink's quality 1..100 by the largest sigma of the position."""
-    sigma_m = math.sqrt(max(estimate.covariance[k, k] for k in range(3)))
+    sigma_m = math.sqrt(max(estimate.covariance.diagonal()[:3].tolist()))
     return max(1, round(100.0 * (1.0 - sigma_m / WORTHLESS_M)))
 
 
-_POSE_FILL: Mapping[str, Callable[[Estimate, NedPose], Fields]] = MappingProxyType(
-    {"VISION_POSITION_ESTIMATE": _vision_position, "ATT_POS_MOCAP": _att_pos_mocap}
+_FILL: Mapping[str, Callable[[Estimate, NedState], Fields]] = MappingProxyType(
+    {
+        "VISION_POSITION_ESTIMATE": _vision_position,
+        "ATT_POS_MOCAP": _att_pos_mocap,
+        "VISION_SPEED_ESTIMATE": _vision_speed,
+        "ODOMETRY": _odometry,
+    }
 )
-_VELOCITY_FILL: Mapping[str, Callable[[Estimate, NedVelocity], Fields]] = MappingProxyType(
-    {"VISION_SPEED_ESTIMATE": _vision_speed}
-)
-ODOMETRY = "ODOMETRY"
-MESSAGES = (*_POSE_FILL, *_VELOCITY_FILL, ODOMETRY)
+MESSAGES = tuple(_FILL)
 """The messages a link may be given; every link gets heartbeats besides."""
 
 
@@ -160,27 +164,23 @@ class Packer:
 
     def __init__(self, room_yaw_deg: float) -> None:
         self._frame = NedFrame(room_yaw_deg)
+        self._turned: tuple[Estimate, NedState] | None = None
 
     def messages(self, estimate: Estimate, names: Iterable[str]) -> dict[str, Message]:
         """Return the messages named (of `MESSAGES`) by name; the turn into NED is done once for all of them."""
         t_ns, available_ns = estimate.t_ns, estimate.available_ns
-        packed: dict[str, Message] = {}
-        pose: NedPose | None = None
-        for name in names:
-            if name in _POSE_FILL:
-                pose = pose or self._frame.pose(estimate)
-                fields = _POSE_FILL[name](estimate, pose)
-            elif name == ODOMETRY:
-                pose = pose or self._frame.pose(estimate)
-                fields = _odometry(estimate, pose, self._frame.twist(estimate))
-            else:
-                fields = _VELOCITY_FILL[name](estimate, self._frame.velocity(estimate))
-            packed[name] = Message(name, t_ns, available_ns, MappingProxyType(fields))
-        return packed
+        return {name: Message(name, t_ns, available_ns, _FILL[name](estimate, self._ned(estimate))) for name in names}
 
     def motion(self, estimate: Estimate) -> tuple[Array, float]:
         """Return the velocity (3,), north-east-down [m/s], and the yaw [rad]."""
-        return np.array(self._frame.velocity(estimate).v_BinN), self._frame.pose(estimate).euler[2]
+        ned = self._ned(estimate)
+        return np.array(ned.v_BinN), ned.euler[2]
+
+    def _ned(self, estimate: Estimate) -> NedState:
+        """Turn an estimate into NED; the newest one's turn is kept."""
+        if self._turned is None or self._turned[0] is not estimate:
+            self._turned = estimate, self._frame.turn(estimate)
+        return self._turned[1]
 
 
 def heartbeat(t_ns: int) -> Message:
@@ -238,10 +238,15 @@ def _rounded(values: Sequence[float]) -> list[float]:
 
 
 class _Layout(NamedTuple):
-    """How a message's payload is laid out: its fields in the wire's order, what packs them, its number's two halves,
-    and the byte of its own in the checksum."""
+    """How a message's payload is laid out.
+
+    pick: gives its fields in the wire's order.  texts, arrays: which of them are of those kinds, the last one first.
+    pack: packs them, arrays one by one.  low, high: its number's two halves.  extra: its own byte in the checksum.
+    """
 
     pick: Callable[[Mapping[str, FieldValue]], tuple[FieldValue, ...]]
+    texts: tuple[int, ...]
+    arrays: tuple[int, ...]
     pack: Callable[..., bytes]
     low: int
     high: int
@@ -252,8 +257,13 @@ class _Layout(NamedTuple):
 def _layout(name: str) -> _Layout:
     dialect_class = _CLASSES[name]
     number, names = dialect_class.id, tuple(dialect_class.ordered_fieldnames)
+    kinds = dict(zip(dialect_class.fieldnames, dialect_class.fieldtypes, strict=True))
+    is_text = [kinds[field] == "char" for field in names]
+    places = range(len(names) - 1, -1, -1)
     return _Layout(
         itemgetter(*names) if len(names) > 1 else lambda fields: (fields[names[0]],),
+        tuple(k for k in places if is_text[k]),
+        tuple(k for k in places if dialect_class.array_lengths[k] and not is_text[k]),
         dialect_class.unpacker.pack,
         number & 0xFFFF,
         number >> 16,
@@ -283,20 +293,17 @@ class Encoder:
         Source: the MAVLink serialisation guide: fields by size, zeros at the end of the payload left out but for its
         first byte, checksum over all but the marker, and over the message's own extra byte.
         """
-        pick, pack, low, high, extra = _layout(message.name)
-        values: list[object] = []
-        for value in pick(message.fields):
-            if isinstance(value, list):
-                values += value
-            else:
-                values.append(value.encode() if isinstance(value, str) else value)
+        pick, texts, arrays, pack, low, high, extra = _layout(message.name)
+        values: list[Any] = [*pick(message.fields)]
+        for k in texts:
+            values[k] = values[k].encode()
+        for k in arrays:
+            values[k : k + 1] = values[k]
         packed = pack(*values)
         payload = packed.rstrip(b"\0") or packed[:1]
-        system_id, component_id = self._identity
         flags = 0 if self._signing is None else SIGNED
-        body = _HEAD.pack(len(payload), flags, 0, sequence, system_id, component_id, low, high) + payload
-        checksum: int = dialect.x25crc(body + extra).crc
-        frame = b"\xfd%b%b" % (body, checksum.to_bytes(2, "little"))
+        body = _HEAD.pack(len(payload), flags, 0, sequence, *self._identity, low, high) + payload
+        frame = b"\xfd" + body + mcrf4xx(body + extra).to_bytes(2, "little")
         return frame if self._signing is None else self._signing.sign(frame)
 
 

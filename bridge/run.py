@@ -7,10 +7,11 @@ One thread, no queue between its parts: an estimate is on the wire before anythi
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from bridge.alarms import Alarm
 from bridge.clock import Clock
 from bridge.heard import Heard, Hearer
 from bridge.monitor import Monitor
@@ -19,7 +20,6 @@ from bridge.recorder import RecorderState
 from bridge.status import Reading, StatusLine
 from bridge.summary import LogSummary, Summary
 from bridge.telemetry.states import LogState, Surroundings
-from bridge.telemetry.telemetry import Telemetry
 from bridge.wire import Sent
 from tracker.types import Event, Rejected, Step
 
@@ -47,6 +47,21 @@ class Records(Protocol):
         """End the recording properly."""
 
 
+class Watches(Protocol):
+    """What judges every turn and tells who listens: `bridge.telemetry.telemetry.Telemetry`."""
+
+    def take(
+        self, event: Event | None, step: Step, sent: tuple[Sent, ...], now_ns: int, around: Callable[[], Surroundings]
+    ) -> None:
+        """Enter one turn of the loop."""
+
+    def alarms(self) -> tuple[Alarm, ...]:
+        """Return the alarms that stand."""
+
+    def close(self, around: Callable[[], Surroundings]) -> None:
+        """Say the last word."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Outlets:
     """Where a run's results go: the autopilots, the figures, and if wanted the log, the screen and who watches."""
@@ -55,7 +70,7 @@ class Outlets:
     monitor: Monitor
     recorder: Records | None = None
     status: StatusLine | None = None
-    telemetry: Telemetry | None = None
+    telemetry: Watches | None = None
     hearer: Hearer = field(default_factory=Hearer)
 
     def log_state(self) -> str:

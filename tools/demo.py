@@ -174,12 +174,12 @@ def _fly(
         status = stack.enter_context(StatusLine(console, clocks.stopwatch))
         telemetry = telemetry_of("demo", settings, rig, monitor, clocks)
         outlets = Outlets(outlet, monitor, recorder, status, telemetry)
+        stack.enter_context(steady())
         clock: Clock = StreamClock() if fast else HostClock(clocks.monotonic, START_NS)
         frames = _until_landed(source, world)
         events = frames if fast else Paced(frames, clock, clocks.sleep_s, clocks.stopwatch)
         try:
-            with steady():
-                run(events, witness, clock, outlets)
+            run(events, witness, clock, outlets)
         finally:
             close(clock, outlets)
     if isinstance(events, Paced) and events.worst_lag_ns > 1e9 / _RATE_HZ:

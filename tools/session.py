@@ -60,17 +60,17 @@ def run_session(request: RunRequest, clocks: Clocks) -> None:
             console.print(f"posebridge: warning: {warning}", style="yellow", soft_wrap=True, highlight=False)
         outlet = links_of(request.settings, clocks, logged=request.log is not None)
         stack.callback(outlet.close)
+        tracker = tracker_of(request.settings, opened.chosen.rig, clocks)
         recorder = _recorder(request, opened, clocks)
         monitor = Monitor(tuple(camera.name for camera in opened.chosen.rig.cameras))
         status = None if request.quiet else stack.enter_context(StatusLine(console, clocks.stopwatch))
         telemetry = telemetry_of(request.source, request.settings, opened.chosen.rig, monitor, clocks)
         outlets = Outlets(outlet, monitor, recorder, status, telemetry)
-        events, clock = _paced(opened, request.pace, clocks)
+        stack.enter_context(steady())
+        events, clock = _paced(opened, request.pace, clocks)  # last: from here on a recording's time runs
         refused = False
         try:
-            tracker = tracker_of(request.settings, opened.chosen.rig, clocks)
-            with steady():
-                run(events, tracker, clock, outlets)
+            run(events, tracker, clock, outlets)
         except OperatorError:
             refused = True  # its one line says it all
             raise

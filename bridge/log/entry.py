@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import base64
+import binascii
 from typing import Any, NamedTuple
 
 import orjson
@@ -61,7 +61,7 @@ def make_entry(
 
 def encode(value: Value) -> bytes:
     """Return a value as JSON; numbers that are not finite, which JSON cannot hold, become null."""
-    return orjson.dumps(value, option=orjson.OPT_SERIALIZE_NUMPY)
+    return orjson.dumps(value, default=dict, option=orjson.OPT_SERIALIZE_NUMPY)
 
 
 def estimate_value(estimate: Estimate, q_BtoW: list[float]) -> Value:
@@ -114,7 +114,7 @@ def sightings_value(frame: FrameTime, sightings: tuple[BallSighting, ...]) -> Va
 
 def _sighting_value(sighting: BallSighting) -> Value:
     u, v = sighting.uv_px.tolist()
-    (uu, uv), (_, vv) = sighting.cov_px.tolist()
+    uu, uv, _, vv = sighting.cov_px.ravel().tolist()
     return {
         "camera": sighting.camera,
         "ball": sighting.ball,
@@ -148,6 +148,6 @@ def sent_value(sent: Sent) -> Value:
         "sent_ns": sent.sent_ns,
         "available_ns": sent.available_ns,
         "latency_ns": sent.sent_ns - sent.available_ns if sent.available_ns else -1,
-        "raw": base64.b64encode(sent.raw).decode(),
-        "fields": dict(sent.fields),
+        "raw": binascii.b2a_base64(sent.raw, newline=False).decode(),
+        "fields": sent.fields,
     }

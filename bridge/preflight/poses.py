@@ -98,5 +98,5 @@ def _timing(estimate: Estimate, now_ns: int, sent_ns: int) -> Timing:
 
 
 def _pose_of(frame: NedFrame, estimate: Estimate) -> Pose:
-    pose = frame.pose(estimate)
-    return Pose(estimate.t_ns, np.array(pose.p_BinN), so3.from_euler(*pose.euler), np.array(pose.euler))
+    ned = frame.turn(estimate)
+    return Pose(estimate.t_ns, np.array(ned.p_BinN), so3.from_euler(*ned.euler), np.array(ned.euler))

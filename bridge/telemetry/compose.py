@@ -28,7 +28,7 @@ MANY, LONG_TEXT = 12, 200
 
 def readings_of(gauges: Gauges, around: Surroundings, limits: Limits) -> Readings:
     """Return what alarms judge by."""
-    recent_ms = gauges.recent_ms()
+    (p99_ms,) = gauges.recent_ms(0.99)
     nis, dof = gauges.nis()
     balls = enumerate(gauges.names.balls)
     return Readings(
@@ -39,7 +39,7 @@ def readings_of(gauges: Gauges, around: Surroundings, limits: Limits) -> Reading
         rate_hz=gauges.rate_hz(),
         age_ms=gauges.age_ms(),
         gap_ms=gauges.worst_gap_ms(),
-        latency_p99_ms=quantile(recent_ms, 0.99),
+        latency_p99_ms=p99_ms,
         nis_ratio=nis / dof if dof else None,
         cameras=tuple(_camera_reading(gauges, index) for index in range(len(gauges.names.cameras))),
         balls=tuple(BallReading(name, gauges.unseen_s(index)) for index, name in balls),
@@ -60,9 +60,9 @@ def snapshot_of(
     alarms: tuple[Alarm, ...],
 ) -> page.Snapshot:
     """Return the state of a run as it is shown."""
-    summary = monitor.summary(around.links, None)
+    tally = monitor.tally()
     window = gauges.bins.last(WINDOW)
-    recent_ms = gauges.recent_ms()
+    p50_ms, p99_ms = gauges.recent_ms(0.5, 0.99)
     stages = [_stage(name, times) for name, times in monitor.durations().items()]
     return page.Snapshot(
         version=page.VERSION,
@@ -71,14 +71,12 @@ def snapshot_of(
         t_ns=gauges.now_ns,
         running_s=gauges.running_s,
         ended=ended,
-        track=page.Track(
-            gauges.state.value, gauges.state_s, summary.lost, summary.resets, _short(gauges.last_rejection)
-        ),
+        track=page.Track(gauges.state.value, gauges.state_s, tally.lost, tally.resets, _short(gauges.last_rejection)),
         pose=_pose(gauges),
         rate=page.Rate(
-            poses=summary.estimates_sent,
+            poses=tally.estimates_sent,
             now_hz=gauges.rate_hz(),
-            mean_hz=summary.rate_hz,
+            mean_hz=tally.rate_hz,
             need_hz=limits.rate_min_hz,
             gap_now_ms=gauges.gap_now_ms,
             gap_recent_ms=gauges.worst_gap_ms(),
@@ -86,8 +84,8 @@ def snapshot_of(
             age_ms=gauges.age_ms(),
         ),
         latency=page.Latency(
-            quantile(recent_ms, 0.5),
-            quantile(recent_ms, 0.99),
+            p50_ms,
+            p99_ms,
             limits.latency_limit_ms,
             next(stage for stage in stages if stage.name == TOTAL),
             tuple(stage for stage in stages if stage.name != TOTAL)[:MANY],
@@ -95,10 +93,10 @@ def snapshot_of(
         nis=_nis(gauges),
         balls=tuple(_short(name) for name in gauges.names.balls[:MANY]),
         cameras=tuple(
-            _camera(gauges, window, index, summary.frames.get(name, 0))
+            _camera(gauges, window, index, tally.frames.get(name, 0))
             for index, name in enumerate(gauges.names.cameras[:MANY])
         ),
-        rejected=dict(summary.rejected),
+        rejected=dict(tally.rejected),
         links=tuple(replace(link, name=_short(link.name), reason=_short(link.reason)) for link in around.links[:MANY]),
         log=None
         if around.log is None
@@ -107,11 +105,6 @@ def snapshot_of(
         history=_history(gauges.bins.last(KEPT)),
         alarms=tuple(_short_alarm(alarm) for alarm in alarms[:MANY]),
     )
-
-
-def quantile(rising: Sequence[float], share: float) -> float | None:
-    """Return the value that `share` of a rising list do not exceed, None of an empty one."""
-    return rising[math.ceil(share * len(rising)) - 1] if rising else None
 
 
 def nis_band(dof: int) -> tuple[float, float]:

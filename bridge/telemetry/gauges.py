@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from bisect import bisect_left
 from collections import deque
 from dataclasses import dataclass
 
@@ -108,9 +110,10 @@ class Gauges:
         """Return the poses a second of the last two, 0 while there is no track [Hz]."""
         if self.state is not TrackState.TRACKING:
             return 0.0
-        recent = [each for each in self._came_ns if self.now_ns - each <= RATE_WINDOW_NS]
-        lasted_ns = recent[-1] - recent[0] if recent else 0
-        return (len(recent) - 1) * 1e9 / lasted_ns if lasted_ns else 0.0
+        first = bisect_left(self._came_ns, self.now_ns - RATE_WINDOW_NS)
+        count = len(self._came_ns) - first
+        lasted_ns = self._came_ns[-1] - self._came_ns[first] if count else 0
+        return (count - 1) * 1e9 / lasted_ns if lasted_ns else 0.0
 
     def age_ms(self) -> float | None:
         """Return how old the oldest pose of the last two seconds was when it left, by its frame's stamp [ms]."""
@@ -124,9 +127,10 @@ class Gauges:
             return None
         return max(going_on_ms, *(each.gap_ns / 1e6 for each in self.bins.last(WINDOW)))
 
-    def recent_ms(self) -> list[float]:
-        """Return the latencies of the newest datagrams in order of length [ms]."""
-        return sorted(latency_ns / 1e6 for latency_ns in self._recent_ns)
+    def recent_ms(self, *shares: float) -> list[float | None]:
+        """Return the latencies that these shares of the newest datagrams do not exceed, None without any [ms]."""
+        rising_ns = sorted(self._recent_ns)
+        return [rising_ns[math.ceil(share * len(rising_ns)) - 1] / 1e6 if rising_ns else None for share in shares]
 
     def nis(self) -> tuple[float, int]:
         """Return the sums of NIS and of degrees of freedom over the window's updates."""

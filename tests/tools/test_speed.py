@@ -31,12 +31,13 @@ def measured() -> Speed:
 
 def test_every_pair_is_tracked_packed_sent_logged_and_counted(measured: Speed) -> None:
     assert measured.pairs == measured.pair_ms.count == PAIRS
-    assert {"intake", "pack", "link", "monitor", "record", "loop"} < set(measured.stages_ms)
+    assert {"intake", "pack", "link", "monitor", "record", "telemetry", "loop"} < set(measured.stages_ms)
     assert measured.run.estimates_sent == PAIRS
     assert measured.run.frames == {"cam0": PAIRS, "cam1": PAIRS}
     assert measured.run.log is not None
     assert measured.run.log.dropped == 0
     assert measured.acquire_ms.count > 0
+    assert measured.snapshot_ms.count > 0
     assert measured.log_bytes > 0
 
 

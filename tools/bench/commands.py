@@ -164,7 +164,12 @@ def _stages_table(result: Speed) -> Table:
     table.add_column("a pair (ms)")
     for column in ("p50", "p95", "p99", "max", "share"):
         table.add_column(column, justify="right")
-    rows = {"acquisition": result.acquire_ms, "whole pair": result.pair_ms, **result.stages_ms}
+    rows = {
+        "acquisition": result.acquire_ms,
+        "snapshot": result.snapshot_ms,
+        "whole pair": result.pair_ms,
+        **result.stages_ms,
+    }
     for name, spread in rows.items():
         figures = (spread.p50, spread.p95, spread.p99, spread.max)
         share = f"{result.shares[name]:.1%}" if name in result.shares else ""

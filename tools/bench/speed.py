@@ -17,19 +17,22 @@ from bridge.pack import MESSAGES, Encoder, Identity, Packer
 from bridge.run import Outlets, close, run
 from bridge.settings import Settings
 from bridge.summary import Percentiles, Summary
+from bridge.telemetry.snapshot import to_bytes
+from bridge.telemetry.telemetry import Telemetry
 from tools.bench.footage import Footage
 from tools.bench.meter import Meter
 from tools.bench.one_core import one_core
 from tools.bench.pairs import Slow, shares_of, slow_of, spread, stages_of
-from tools.bench.stages import Stages, TimedLink, TimedMonitor, TimedPacker, TimedRecorder, TimedTracker
+from tools.bench.stages import Stages, TimedLink, TimedMonitor, TimedPacker, TimedRecorder, TimedTelemetry, TimedTracker
 from tools.request import Clocks, CpuClocks
-from tools.session import recorder_of, tracker_of
+from tools.session import recorder_of, telemetry_of, tracker_of
 from tools.steady import steady
 from tracker.types import Frame, Silence, TrackState
 
 WARM_UP = 300  # instants: templates drawn, light learned
 LONG_AGO_NS = 3_600_000_000_000
 FRAMES_KEPT = 90  # instants
+SNAPSHOTS = 100
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,8 +44,10 @@ class Speed:
     pair_ms: from a pair's first frame to the end of the loop's work on both.
     acquire_ms: one stereo pair, whole frames searched.
     stages_ms: the parts of a pair, the longest first: the tracker's own stages, `intake` (all else in the tracker),
-        pack, link, monitor, record (handing over to the log's thread), loop (what is left).
+        pack, link, monitor, record (handing over to the log's thread), telemetry (alarms, the look for who listens),
+        loop (what is left).
     shares: of each in the time of all pairs; they add up to 1.
+    snapshot_ms: one snapshot for `posebridge monitor`, which the loop makes five times a second while it is watched.
     slow: the pairs that took long, and why.
     log_thread_ms: mean CPU time of the threads other than the loop's, which is the log's, a pair.
     log_bytes: a pair, on the disk.
@@ -57,6 +62,7 @@ class Speed:
     acquire_ms: Percentiles
     stages_ms: dict[str, Percentiles]
     shares: dict[str, float]
+    snapshot_ms: Percentiles
     slow: Slow
     log_thread_ms: float
     log_bytes: float
@@ -76,10 +82,13 @@ def measure_speed(settings: Settings, clocks: Clocks, cpu: CpuClocks, pairs: int
         identity = Identity(DEFAULT_SYSTEM_ID, settings.mavlink.component_id)
         link = TimedLink(open_link("memory:", Encoder(identity), clocks.stopwatch), stages)
         recorder = recorder_of(log, settings, footage.rig, {"source": "bench"}, clocks, block_when_full=True)
+        monitor = TimedMonitor(names, stages)
+        telemetry = telemetry_of("bench", settings, footage.rig, monitor, clocks)
         outlets = Outlets(
             Outlet([Spout(link, Terms(messages=MESSAGES))], packer),
-            TimedMonitor(names, stages),
+            monitor,
             TimedRecorder(recorder, stages),
+            telemetry=TimedTelemetry(telemetry, stages),
         )
         clock, timed = StreamClock(), TimedTracker(tracker, stages, clocks.stopwatch)
         with steady(), meter.watch_garbage():
@@ -100,11 +109,22 @@ def measure_speed(settings: Settings, clocks: Clocks, cpu: CpuClocks, pairs: int
             _acquisition(settings, clocks, footage),
             stages_of(meter.pairs),
             shares_of(meter.pairs),
+            _snapshots(telemetry, outlets, clocks),
             slow_of(meter.pairs),
             (process_ns - thread_ns) / pairs / 1e6,
             log.stat().st_size / pairs,
             outlets.summary(str(log)),
         )
+
+
+def _snapshots(telemetry: Telemetry, outlets: Outlets, clocks: Clocks) -> Percentiles:
+    """Time what a watched run's loop does besides: the state of the run, put together and written down."""
+    histogram = Histogram()
+    for _ in range(SNAPSHOTS):
+        started_ns = clocks.stopwatch()
+        to_bytes(telemetry.snapshot(outlets.surroundings))
+        histogram.add(clocks.stopwatch() - started_ns)
+    return histogram.percentiles()
 
 
 def _acquisition(settings: Settings, clocks: Clocks, footage: Footage) -> Percentiles:

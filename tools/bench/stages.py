@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from typing import ParamSpec, TypeVar
 
+from bridge.alarms import Alarm
 from bridge.clock import Nanoseconds
 from bridge.heard import Heard
 from bridge.links import Link
 from bridge.monitor import Monitor
 from bridge.pack import Packer
 from bridge.recorder import RecorderState
-from bridge.run import Records, Steps
+from bridge.run import Records, Steps, Watches
+from bridge.telemetry.states import Surroundings
 from bridge.wire import LinkState, Message, Sent
 from tracker.types import Estimate, Event, Step
 
@@ -145,3 +147,25 @@ class TimedRecorder:
     def close(self) -> None:
         """End the recording."""
         self._recorder.close()
+
+
+class TimedTelemetry:
+    """Times alarms and the look for who listens, as `telemetry`."""
+
+    def __init__(self, telemetry: Watches, stages: Stages) -> None:
+        self._telemetry = telemetry
+        self._timed = stages
+
+    def take(
+        self, event: Event | None, step: Step, sent: tuple[Sent, ...], now_ns: int, around: Callable[[], Surroundings]
+    ) -> None:
+        """Enter one turn."""
+        self._timed.time("telemetry", self._telemetry.take, event, step, sent, now_ns, around)
+
+    def alarms(self) -> tuple[Alarm, ...]:
+        """Return the alarms that stand."""
+        return self._telemetry.alarms()
+
+    def close(self, around: Callable[[], Surroundings]) -> None:
+        """Say the last word."""
+        self._telemetry.close(around)

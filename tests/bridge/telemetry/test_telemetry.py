@@ -11,19 +11,20 @@ import pytest
 from scipy.stats import chi2
 
 from bridge.telemetry.bins import KEPT, Bins
-from bridge.telemetry.compose import EDGES_MS, nis_band, quantile
-from bridge.telemetry.gauges import Names
+from bridge.telemetry.compose import EDGES_MS, nis_band
+from bridge.telemetry.gauges import Gauges, Names
 from bridge.telemetry.logged import LoggedRun
 from bridge.telemetry.parse import from_bytes
 from bridge.telemetry.snapshot import MAX_BYTES, VERSION, to_bytes
 from bridge.telemetry.states import LogState, Surroundings
-from bridge.wire import LinkState
+from bridge.wire import LinkState, Sent
 from tests.bridge.recordings import PERIOD_NS, START_NS, record, turns
 from tests.bridge.telemetry.watched import UP, Watched
 from tracker.errors import OperatorError
-from tracker.types import TrackState
+from tracker.types import Silence, Step, TrackState
 
 SECOND_NS = 1_000_000_000
+MS = 1_000_000
 
 
 def test_a_snapshot_comes_off_the_wire_as_it_went_on() -> None:
@@ -124,9 +125,17 @@ def test_the_nis_band_is_chi_squares(dof: int) -> None:
     np.testing.assert_allclose(nis_band(dof), expected, rtol=1e-9)
 
 
-def test_a_quantile_is_a_value_of_the_list_that_its_share_does_not_exceed() -> None:
-    rising = [float(value) for value in range(1, 101)]
-    assert (quantile(rising, 0.5), quantile(rising, 0.99), quantile([], 0.5)) == (50.0, 99.0, None)
+def test_recent_latencies_are_those_that_their_shares_do_not_exceed() -> None:
+    gauges = Gauges(Names(("cam0",), ("red",), (0.0,)))
+    assert gauges.recent_ms(0.5, 0.99) == [None, None]
+    slowest_first = tuple(Sent("memory:", "POSE", 1, k * MS, 1, b"", {}) for k in range(100, 0, -1))
+    gauges.take(
+        Silence(1),
+        Step(TrackState.SEARCHING),
+        tuple(sent._replace(sent_ns=sent.sent_ns + 1) for sent in slowest_first),
+        1,
+    )
+    assert gauges.recent_ms(0.5, 0.99) == [50.0, 99.0]
 
 
 def test_seconds_without_anything_are_empty_bins_and_old_ones_go() -> None:
