@@ -74,7 +74,9 @@ class SitlRequest:
         if self.mistakes and (self.faults or self.connect is not None):
             raise OperatorError("--mistakes: starts a flight for each; give neither --faults nor --connect with it")
         if self.frame not in FRAMES:
-            raise OperatorError(f"--frame {self.frame}: not known; known are {', '.join(FRAMES)}")
+            raise OperatorError(
+                f"--frame {self.frame}: not known; known are {', '.join(FRAMES)}: that is all we have physics for"
+            )
 
 
 class _Witness:
