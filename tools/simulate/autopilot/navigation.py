@@ -227,7 +227,7 @@ class Navigation:
         for what, ratio, rows, lost in (
             (LEVEL, level, [0, 1], self._aiding.lost_level),
             (HEIGHT, height, [2], self._aiding.lost_height),
-        ):
+        )[: 1 if self._by_barometer else 2]:
             if lost:
                 target = state.p_BinN.copy()
                 target[rows] = sample.p_BinN[rows]

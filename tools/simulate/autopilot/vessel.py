@@ -80,7 +80,7 @@ class Autopilot:
         self._guided = Guided()
         self._state: NavState | None = None
         self._increment = _NO_INCREMENT
-        self._shift_inN = np.zeros(3)
+        self._shift_inN = self._shift_armed_inN = np.zeros(3)
         self._now_ns = 0
         self._heard = False
         self._ready_since_ns: int | None = None
@@ -133,11 +133,11 @@ class Autopilot:
             self._guided.rebase(jump_inN, self._state)
 
     def reference(self) -> Reference:
-        """Return what is to be flown now, moved along with the filter's own jumps."""
+        """Return what is to be flown now, moved along with the filter's own jumps since it was armed."""
         if self._mission is None:
             return self._guided.reference()
         wanted = self._mission(self.mission_s)
-        shift = self.navigation.shift_inN
+        shift = self.navigation.shift_inN - self._shift_armed_inN
         return Reference(wanted.phase, wanted.p + shift, wanted.v, wanted.a, wanted.yaw, wanted.yaw_rate)
 
     def snapshot(self) -> Snapshot:
@@ -238,6 +238,7 @@ class Autopilot:
             self._texts += [f"Arm: {reason}" for reason in reasons]
             return requests.FAILED
         self.mode = Mode.FLYING
+        self._shift_armed_inN = self.navigation.shift_inN
         self._texts.append("Arming motors")
         return requests.ACCEPTED
 
