@@ -9,7 +9,7 @@ import numpy as np
 
 from bridge.links import open_link
 from bridge.pack import Encoder, Identity, Packer, heartbeat
-from tools.simulate.autopilot.navigation import Origin
+from tools.simulate.autopilot.origins import Origin
 from tools.simulate.helicopter import Helicopter
 from tools.simulate.mission import Mission
 from tools.simulate.world import Surroundings, World

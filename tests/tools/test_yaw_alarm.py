@@ -11,7 +11,7 @@ from bridge.dialogue import DialogueState, Terms
 from bridge.links import MemoryLink, open_link
 from bridge.outlet import Outlet, Spout
 from bridge.pack import Encoder, Identity, Packer, Reader
-from tools.simulate.autopilot.navigation import Origin
+from tools.simulate.autopilot.origins import Origin
 from tools.simulate.autopilot.vessel import Mode
 from tools.simulate.helicopter import Helicopter
 from tools.simulate.mission import Mission

@@ -91,15 +91,23 @@ def sitl(
     frame: Annotated[str, typer.Option(help="The vehicle: heli.")] = "heli",
     config: ConfigOption = "lab",
     faults: Annotated[bool, typer.Option("--faults", help="Rehearse what may go wrong, in the air.")] = False,
+    mistakes: Annotated[
+        bool, typer.Option("--mistakes", help="Instead: true poses sent wrongly in every way known, a flight each.")
+    ] = False,
     out: Annotated[Path, typer.Option(help="Folder for log and report.", metavar="DIR")] = Path("logs/sitl"),
 ) -> None:
     """Fly an autopilot's own software on simulated cameras: origin, arming, hover, square, landing.
 
-    Exit code 0 only if every figure keeps its limit; else 1.
+    Exit code 0 only if every figure keeps its limit; else 1. --mistakes judges nothing.
     """
     from tools.sitl.session import SitlRequest
 
-    request = SitlRequest(binary, frame, config, out, faults, connect=connect)
+    request = SitlRequest(binary, frame, config, out, faults, connect=connect, mistakes=mistakes)
+    if mistakes:
+        from tools.sitl.trials import run_trials
+
+        run_trials(binary, config, out)
+        return
 
     from tools.sitl.command import run_sitl
 

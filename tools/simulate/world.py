@@ -9,7 +9,7 @@ import numpy as np
 
 from bridge.ned import rotation_from_room
 from tools.simulate.autopilot.imu import Imu, ImuNoise
-from tools.simulate.autopilot.navigation import Origin
+from tools.simulate.autopilot.origins import Origin
 from tools.simulate.autopilot.parameters import FOR_VISION
 from tools.simulate.autopilot.vessel import Autopilot, Mode
 from tools.simulate.control import PilotSticks

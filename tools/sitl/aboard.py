@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
+from bridge.settings import Settings
 from tools.simulate.autopilot.parameters import FOR_VISION
 from tools.simulate.helicopter import Helicopter
 from tools.sitl.airframe import VEHICLE
@@ -14,6 +15,7 @@ from tools.sitl.ground import GroundStation
 from tools.sitl.lockstep import PHYSICS_PORT
 from tools.sitl.pilots import ArduPilot, Own, Radio
 from tools.sitl.process import Simulator, Wiring
+from tools.sitl.radio import RADIO_PORT, free_port
 from tools.sitl.relay import Relay
 from tools.sitl.setup import parameter_file
 from tools.sitl.wire import TcpWire, UdpWire
@@ -51,6 +53,18 @@ class Conditions:
     start_ns: int
 
 
+def home_of(settings: Settings) -> tuple[float, float, float]:
+    """Return latitude, longitude [deg] and altitude [m] of the room's origin.
+
+    Raises:
+        OperatorError: a config without one.
+    """
+    origin = settings.origin
+    if origin is None:
+        raise OperatorError("sitl: the config names no [origin]; ArduPilot flies with none, so add one as in lab.toml")
+    return origin.latitude_deg, origin.longitude_deg, origin.altitude_m
+
+
 def simulated(given: Conditions) -> Aboard:
     """Switch the project's simulated autopilot on."""
     pilot = Own({**FOR_VISION, "VISO_DELAY_MS": given.delay_ms}, given.start_ns)
@@ -64,11 +78,12 @@ def started(binary: Path, folder: Path, given: Conditions, radio: Radio, stack: 
     Raises:
         OperatorError: no program there.
     """
-    pilot = ArduPilot(given.room_yaw_deg, radio, given.start_ns)
+    radio_port = free_port()
+    pilot = ArduPilot(given.room_yaw_deg, radio, given.start_ns, 0, radio_port)
     ground, bridge = UdpWire(), UdpWire()
     aboard = Aboard(pilot, GroundStation(ground), Relay(bridge), VEHICLE)
     try:
-        wiring = Wiring(pilot.port, ground.port, bridge.port)
+        wiring = Wiring(pilot.port, ground.port, bridge.port, radio_port)
         simulator = Simulator(binary, folder, wiring, given.home, parameter_file(given.delay_ms, {}))
     except OperatorError:
         close(aboard)
@@ -91,7 +106,7 @@ def running(uri: str, folder: Path, given: Conditions, radio: Radio) -> Aboard:
     (folder / PARAMETERS).write_text(parameter_file(given.delay_ms, {}), encoding="utf-8")
     host, port = form[1], int(form[2])
     with ExitStack() as opened:
-        pilot = ArduPilot(given.room_yaw_deg, radio, given.start_ns, PHYSICS_PORT)
+        pilot = ArduPilot(given.room_yaw_deg, radio, given.start_ns, PHYSICS_PORT, RADIO_PORT)
         opened.callback(pilot.close)
         ground = TcpWire(host, port)
         opened.callback(ground.close)

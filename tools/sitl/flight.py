@@ -19,8 +19,9 @@ RATES_HZ = {193: 10.0, 32: 25.0, 33: 2.0, 30: 25.0}
 """EKF_STATUS_REPORT, LOCAL_POSITION_NED, GLOBAL_POSITION_INT, ATTITUDE."""
 
 _RETRY_S, _TARGET_S = 1.0, 0.04
+_SWING_S = 6.0
 _RUNS, _POSITION = 0x400, 0x33F
-_TARGET_MASK = 0b1001_1100_0000  # position, velocity and yaw count; acceleration and yaw rate do not
+_TARGET_MASK = 0b1000_0000_0000  # position, velocity, acceleration and yaw count; yaw rate does not
 
 
 class FlightError(OperatorError):
@@ -31,11 +32,13 @@ class Flight:
     """The ground station's part of a flight, as generators that are taken up again every 20 ms.
 
     mission: the path in the room.  room_yaw: heading of the room's x axis [rad].
-    The origin is the bridge's to give; here it is awaited.
+    origin: latitude, longitude [deg] and altitude [m] to tell the autopilot; None leaves that to the bridge, and it is
+        only awaited.
     """
 
-    def __init__(self, mission: Mission, room_yaw: float) -> None:
+    def __init__(self, mission: Mission, room_yaw: float, origin: tuple[float, float, float] | None = None) -> None:
         self.mission = mission
+        self._origin = origin
         self._room_yaw = room_yaw
         self._R_WtoN = rotation_from_room(room_yaw)
         self.rotor_on = False
@@ -47,14 +50,28 @@ class Flight:
 
     def plan(self, world: World, rehearsal: Iterator[None]) -> Iterator[None]:
         """Fly; the rehearsal of faults, if any, comes after the hover."""
-        yield from self._prepare(world)
-        yield from self._arm(world)
-        yield from self._take_off(world)
+        yield from self.up(world)
         yield from self._follow(world, Phase.HOVER)
         yield from rehearsal
         yield from self._follow(world, Phase.SQUARE)
         yield from self._follow(world, Phase.TURN)
         yield from self._land(world)
+
+    def up(self, world: World) -> Iterator[None]:
+        """Wait for origin and position, arm, take off, and stand still at the mission's home point."""
+        yield from self._prepare(world)
+        yield from self._arm(world)
+        yield from self._take_off(world)
+
+    def swing(self, world: World) -> Iterator[None]:
+        """Go to and fro between the home point and the one opposite, endlessly, as a pendulum does."""
+        home, start_ns = self.mission.corners_inW[0], world.now_ns
+        rate = 2.0 * np.pi / _SWING_S
+        while True:
+            angle = rate * (world.now_ns - start_ns) / 1e9
+            p, v = float(np.cos(angle)) * home, -rate * float(np.sin(angle)) * home
+            self._aim(world, Reference(Phase.HOVER, p, v, -(rate**2) * p, 0.0, 0.0))
+            yield from _wait(world, _TARGET_S)
 
     def hold(self, world: World, seconds: float) -> Iterator[None]:
         """Stay at the mission's home point for a while."""
@@ -72,8 +89,20 @@ class Flight:
         for message, rate_hz in RATES_HZ.items():
             yield from self._command(world, SET_INTERVAL, message, 1e6 / rate_hz)
         yield from _until(world, lambda: _runs(world), 60.0, "EKF running")
+        if self._origin is not None:
+            self._tell_origin(world, self._origin)
         yield from _until(world, lambda: _knows_position(world), 90.0, "EKF position")
         self._mark(world, "position")
+
+    def _tell_origin(self, world: World, origin: tuple[float, float, float]) -> None:
+        latitude_deg, longitude_deg, altitude_m = origin
+        world.ground.say(
+            "SET_GPS_GLOBAL_ORIGIN",
+            target_system=1,
+            latitude=round(1e7 * latitude_deg),
+            longitude=round(1e7 * longitude_deg),
+            altitude=round(1e3 * altitude_m),
+        )
 
     def _arm(self, world: World) -> Iterator[None]:
         world.phase = "arm"
@@ -130,13 +159,14 @@ class Flight:
         there = reference.turned(self._R_WtoN, self._room_yaw)
         x, y, z = there.p.tolist()
         vx, vy, vz = there.v.tolist()
+        afx, afy, afz = there.a.tolist()
         world.ground.say(
             "SET_POSITION_TARGET_LOCAL_NED",
             target_system=1,
             target_component=1,
             coordinate_frame=1,
             type_mask=_TARGET_MASK,
-            **{"x": x, "y": y, "z": z, "vx": vx, "vy": vy, "vz": vz},
+            **{"x": x, "y": y, "z": z, "vx": vx, "vy": vy, "vz": vz, "afx": afx, "afy": afy, "afz": afz},
             yaw=float(np.remainder(there.yaw + np.pi, 2.0 * np.pi) - np.pi),
         )
 

@@ -15,6 +15,7 @@ from tools.simulate.helicopter import Sticks
 from tools.simulate.world import wired
 from tools.sitl.airframe import sticks_of
 from tools.sitl.lockstep import Lockstep
+from tools.sitl.radio import Transmitter
 from tools.sitl.world import STEP_NS, TICK_STEPS
 
 Radio = Callable[[], tuple[int, ...]]
@@ -25,24 +26,32 @@ class ArduPilot:
     """The real program, through its physics interface.
 
     start_ns: simulated time at which its own begins.  port: where it looks for its physics, 0 for any that is free.
+    radio_port: where it listens for its radio.
     """
 
-    def __init__(self, room_yaw_deg: float, radio: Radio, start_ns: int, port: int = 0) -> None:
+    def __init__(self, room_yaw_deg: float, radio: Radio, start_ns: int, port: int, radio_port: int) -> None:
         self._lockstep = Lockstep(rotation_from_room(math.radians(room_yaw_deg)), port)
+        self._transmitter = Transmitter(radio_port)
         self._radio = radio
         self._start_ns = start_ns
+        self._steps = 0
         self.port = self._lockstep.port
 
     def sticks(self, now_ns: int, course: Course) -> Sticks:
         """Wait for its servos, then tell it of the step that is over."""
         pwm = self._lockstep.servos()
         t_s = (now_ns - self._start_ns) / 1e9 + STEP_NS / 1e9
-        self._lockstep.tell(t_s, course.back(1), course.back(0), STEP_NS / 1e9, self._radio())
+        rc_us = self._radio()
+        if self._steps % TICK_STEPS == 0:
+            self._transmitter.send(rc_us)
+        self._steps += 1
+        self._lockstep.tell(t_s, course.back(1), course.back(0), STEP_NS / 1e9, rc_us)
         return sticks_of(pwm)
 
     def close(self) -> None:
-        """Close the interface."""
+        """Close the interface, and switch the radio off."""
         self._lockstep.close()
+        self._transmitter.close()
 
 
 class Own:

@@ -14,11 +14,12 @@ _PATIENCE_S = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Wiring:
-    """UDP ports on 127.0.0.1 that the simulator calls: physics, ground station, bridge."""
+    """UDP ports of 127.0.0.1: the simulator calls those of physics, ground station and bridge, and listens at radio."""
 
     physics: int
     ground: int
     bridge: int
+    radio: int
 
 
 class Simulator:
@@ -61,13 +62,14 @@ class Simulator:
 def arguments(wiring: Wiring, home: tuple[float, float, float]) -> list[str]:
     """Return the simulator's command line.
 
-    Serial ports are UDP clients: none listens, where `tcp:0` would be open to the whole network. `--speedup` is beyond
+    Serial ports are UDP clients: none listens, where `tcp:0` would be open to the whole network. Its radio's port is
+    open to all the same; it is another each time. `--speedup` is beyond
     reach, so that it never sleeps: the physics decide how time goes.
     """
     return [
         *("--model", "JSON:127.0.0.1", "--sim-port-out", str(wiring.physics)),
         *("--speedup", "100", "-I0", "--wipe", "--home", ",".join(f"{each:.7f}" for each in (*home, 0.0))),
-        *("--defaults", "vision.parm"),
+        *("--defaults", "vision.parm", "--rc-in-port", str(wiring.radio)),
         *("--serial0", f"udpclient:127.0.0.1:{wiring.ground}"),
         *("--serial1", f"udpclient:127.0.0.1:{wiring.bridge}"),
         *("--serial2", "none:", "--serial3", "none:", "--serial4", "none:"),

@@ -26,7 +26,7 @@ from tools.request import Clocks
 from tools.session import recorder_of, telemetry_of, tracker_of
 from tools.simulate.helicopter import Helicopter
 from tools.simulate.mission import Mission
-from tools.sitl.aboard import Aboard, Conditions, running, simulated, started
+from tools.sitl.aboard import Aboard, Conditions, home_of, running, simulated, started
 from tools.sitl.aboard import close as close_aboard
 from tools.sitl.faults import Faults
 from tools.sitl.flight import Flight
@@ -52,7 +52,8 @@ class SitlRequest:
 
     binary: ArduPilot's program, None for the project's simulated autopilot.  out: folder for its files.
     connect: tcp:HOST:PORT of SERIAL0 of one that runs already, None for none.
-    faults: whether to rehearse them.  mission_s: time for take-off, hover, square, turn and landing together.
+    faults: whether to rehearse them.  mistakes: whether only to try those of `tools.sitl.mistakes`.
+    mission_s: time for take-off, hover, square, turn and landing together.
 
     Raises:
         OperatorError: a frame that there is none of.
@@ -65,12 +66,17 @@ class SitlRequest:
     faults: bool
     mission_s: float = 45.0
     connect: str | None = None
+    mistakes: bool = False
 
     def __post_init__(self) -> None:
         if self.binary is not None and self.connect is not None:
             raise OperatorError("--binary and --connect: start one or take one that runs; give one of them")
+        if self.mistakes and (self.faults or self.connect is not None):
+            raise OperatorError("--mistakes: starts a flight for each; give neither --faults nor --connect with it")
         if self.frame not in FRAMES:
-            raise OperatorError(f"--frame {self.frame}: not known; known are {', '.join(FRAMES)}")
+            raise OperatorError(
+                f"--frame {self.frame}: not known; known are {', '.join(FRAMES)}: that is all we have physics for"
+            )
 
 
 class _Witness:
@@ -129,7 +135,7 @@ def _set_up(request: SitlRequest, settings: Settings, stack: ExitStack) -> tuple
     room_yaw_deg = settings.room.room_yaw_deg
     mission = Mission(request.mission_s, FLOOR_Z_M + Helicopter.skid_m)
     flight = Flight(mission, math.radians(room_yaw_deg))
-    given = Conditions(room_yaw_deg, _home(settings), round(_CAMERA_DELAY_NS / 1e6), START_NS)
+    given = Conditions(room_yaw_deg, home_of(settings), round(_CAMERA_DELAY_NS / 1e6), START_NS)
     if request.connect is not None:
         aboard = running(request.connect, request.out, given, flight.radio)
     elif request.binary is not None:
@@ -140,14 +146,6 @@ def _set_up(request: SitlRequest, settings: Settings, stack: ExitStack) -> tuple
     place = (float(mission.ground_inW[0]), float(mission.ground_inW[1]))
     world = World(aboard.pilot, aboard.ground, aboard.relay, aboard.helicopter, START_NS, place, room_yaw_deg)
     return aboard, flight, world
-
-
-def _home(settings: Settings) -> tuple[float, float, float]:
-    """Return latitude, longitude [deg] and altitude [m] of the room's origin, which the bridge tells the autopilot."""
-    origin = settings.origin
-    if origin is None:
-        raise OperatorError("sitl: the config names no [origin]; ArduPilot flies with none, so add one as in lab.toml")
-    return origin.latitude_deg, origin.longitude_deg, origin.altitude_m
 
 
 def _run(

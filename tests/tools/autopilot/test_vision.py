@@ -102,6 +102,17 @@ def test_the_sigma_is_the_root_of_the_sum_of_variances_and_no_less_than_the_nois
     assert (small.sigma_m, unknown.sigma_m) == (0.1, 0.1)
 
 
+def test_a_variance_that_is_no_number_beside_the_first_makes_the_sigma_huge_and_is_an_error_of_the_autopilots() -> None:
+    sensor = Sensor(VISO_POS_M_NSE=0.1)
+    unknown = pose_of(sensor.take("VISION_POSITION_ESTIMATE", 1000, covariance=[math.nan] + [1e-6] * 20))
+    assert (unknown.sigma_m, sensor.sensor.met_nan) == (0.1, False)
+    covariance = [1e-6] * 21
+    covariance[6] = math.nan
+    broken = pose_of(sensor.take("VISION_POSITION_ESTIMATE", 1100, covariance=covariance))
+    assert broken.sigma_m == pytest.approx(50.05)
+    assert sensor.sensor.met_nan
+
+
 def test_odometry_counts_only_in_local_and_body_frd_and_its_velocity_is_the_bodys() -> None:
     sensor = Sensor()
     half = math.sqrt(0.5)

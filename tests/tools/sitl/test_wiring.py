@@ -87,7 +87,7 @@ def test_speeding_up_forwards_is_felt_forwards_and_a_left_turn_is_a_negative_yaw
 
 
 def test_the_simulator_listens_at_no_serial_port() -> None:
-    given_ = arguments(Wiring(1, 2, 3), (47.0, 8.0, 400.0))
+    given_ = arguments(Wiring(1, 2, 3, 4), (47.0, 8.0, 400.0))
     ports = [given_[k + 1] for k, each in enumerate(given_) if each.startswith("--serial")]
     assert len(ports) == 5
     assert all(port.startswith(("udpclient:127.0.0.1:", "none:")) for port in ports)

@@ -91,6 +91,11 @@ class Innovation:
         """Return the expected variance of each difference (m,)."""
         return np.asarray(np.einsum("ij,jk,ik->i", self.H, state.covariance, self.H) + self.variance)
 
+    def ratio(self, state: FilterState, gate: float, rows: slice) -> float:
+        """Return the sum of squares over what the gate allows: sums of several variances, as EKF3 builds it."""
+        squares = float((self.difference[rows] ** 2).sum())
+        return squares / (gate**2 * float(self.spread(state)[rows].sum()))
+
 
 def position_innovation(state: FilterState, p_BinN: Array, sigma_m: float) -> Innovation:
     """Compare with a measured position."""

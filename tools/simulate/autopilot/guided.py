@@ -11,7 +11,7 @@ from tools.simulate.autopilot.navigation import NavState
 from tools.simulate.mission import Phase, Reference
 from tracker.types import Array
 
-_TOP_M_S, _TOP_M_S2, _NEAR_1_S = 0.5, 0.8, 1.2
+_TOP_M_S, _TOP_M_S2, _NEAR_1_S, _CLOSING_1_S = 0.5, 0.8, 1.2, 1.0
 _DOWN_M_S, _LAND_M_S = 0.03, 0.3
 _IGNORES_POSITION, _IGNORES_YAW = 0b111, 0b100_0000_0000
 _STILL_ROUNDS = 50
@@ -45,6 +45,16 @@ class Guided:
             self._target = np.array([fields[axis] for axis in "xyz"], dtype=np.float64)
             if not mask & _IGNORES_YAW:
                 self._yaw = float(np.asarray(fields["yaw"]))
+
+    def rebase(self, jump_inN: Array, state: NavState) -> None:
+        """Go along with a jump of the filter's position, each axis that jumped for itself; it has led to the state.
+
+        The point keeps its distance to the vehicle, and what was to be added to the vehicle's speed to close it
+        becomes its own: once that does little; at every pose the vehicle runs away from its target.
+        Source: AC_PosControl::handle_ekf_xy_reset and _z_reset.
+        """
+        self._v = self._v + _CLOSING_1_S * (self._p + jump_inN - state.p_BinN) * (jump_inN != 0.0)
+        self._p = self._p + jump_inN
 
     def descend(self) -> None:
         """Go down where the vehicle is."""

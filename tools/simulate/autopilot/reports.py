@@ -10,7 +10,8 @@ from types import MappingProxyType
 from bridge.pack import enum, make_message
 from bridge.wire import FieldValue, Message
 from tools.simulate.autopilot.imu import Increment
-from tools.simulate.autopilot.navigation import Navigation, NavState, Origin
+from tools.simulate.autopilot.navigation import Navigation, NavState
+from tools.simulate.autopilot.origins import Origin
 from tools.simulate.control import PilotSticks
 from tools.simulate.dynamics import GRAVITY
 

@@ -12,7 +12,7 @@ from typing import Protocol
 
 from bridge.pack import enum, make_message
 from bridge.wire import FieldValue, Message, Received
-from tools.simulate.autopilot.navigation import Origin
+from tools.simulate.autopilot.origins import Origin
 from tools.simulate.autopilot.parameters import Parameter, Parameters
 from tools.simulate.autopilot.port import Port
 from tools.simulate.autopilot.reports import NUMBERS, Snapshot, report

@@ -13,7 +13,8 @@ from tools.simulate.autopilot.arming import refusals
 from tools.simulate.autopilot.failsafe import EkfFailsafe
 from tools.simulate.autopilot.guided import Guided
 from tools.simulate.autopilot.imu import Increment
-from tools.simulate.autopilot.navigation import Navigation, NavState, Origin
+from tools.simulate.autopilot.navigation import Navigation, NavState
+from tools.simulate.autopilot.origins import Origin
 from tools.simulate.autopilot.parameters import FOR_VISION, Parameters
 from tools.simulate.autopilot.port import Port
 from tools.simulate.autopilot.reports import GUIDED, LAND, Snapshot, report
@@ -80,6 +81,7 @@ class Autopilot:
         self._state: NavState | None = None
         self._increment = _NO_INCREMENT
         self._given = PilotSticks()
+        self._shift_inN = self._shift_armed_inN = np.zeros(3)
         self._now_ns = 0
         self._heard = False
         self._ready_since_ns: int | None = None
@@ -115,8 +117,10 @@ class Autopilot:
         """
         self.hear(world_ns)
         self._increment = increment
+        self.navigation.flies = self.armed
         self.navigation.advance(self._now_ns // 1_000_000, increment)
         self._state = self.navigation.state_now()
+        self._go_along()
         if self._origin is not None and self.navigation.runs and self.navigation.origin is None:
             self.set_origin(self._origin)
         self._decide()
@@ -124,12 +128,18 @@ class Autopilot:
         self._given = self._sticks(increment.dt_s)
         return self._given
 
+    def _go_along(self) -> None:
+        """Move the target with a jump of the filter."""
+        jump_inN, self._shift_inN = self.navigation.shift_inN - self._shift_inN, self.navigation.shift_inN
+        if self._state is not None and self.armed and jump_inN.any():
+            self._guided.rebase(jump_inN, self._state)
+
     def reference(self) -> Reference:
-        """Return what is to be flown now, moved along with the filter's own jumps."""
+        """Return what is to be flown now, moved along with the filter's own jumps since it was armed."""
         if self._mission is None:
             return self._guided.reference()
         wanted = self._mission(self.mission_s)
-        shift = self.navigation.shift_inN
+        shift = self.navigation.shift_inN - self._shift_armed_inN
         return Reference(wanted.phase, wanted.p + shift, wanted.v, wanted.a, wanted.yaw, wanted.yaw_rate)
 
     def snapshot(self) -> Snapshot:
@@ -144,7 +154,8 @@ class Autopilot:
     def refusals(self) -> list[str]:
         """Return why it does not arm."""
         healthy = self.vision.healthy(self._now_ns // 1_000_000)
-        return list(refusals(self.parameters, self.navigation, healthy))
+        errors = ["Internal errors 0x400 l:66 cnst_nan"] if self.vision.met_nan else []
+        return errors + list(refusals(self.parameters, self.navigation, healthy))
 
     def command(self, number: int, values: tuple[float, ...]) -> int | None:
         """Do a command; None for one not known."""
@@ -180,7 +191,9 @@ class Autopilot:
                 if other is not port:
                     other.forward(message.raw)
             self._heard |= message.message == HEARTBEAT and message.component_id == VISION_COMPONENT
+            erred = self.vision.met_nan
             samples = self.vision.take(message, self._now_ns // 1000, port.clock, self.navigation.runs)
+            self._texts += ["Internal Errors 0x400"] * (self.vision.met_nan and not erred)
             self.navigation.take(samples)
             if self._mission is None and message.message == "SET_POSITION_TARGET_LOCAL_NED":
                 self._guided.go_to(message.fields)
@@ -227,6 +240,7 @@ class Autopilot:
             self._texts += [f"Arm: {reason}" for reason in reasons]
             return requests.FAILED
         self.mode = Mode.FLYING
+        self._shift_armed_inN = self.navigation.shift_inN
         self._texts.append("Arming motors")
         return requests.ACCEPTED
 
@@ -264,10 +278,9 @@ class Autopilot:
     def _sticks(self, dt_s: float) -> PilotSticks:
         if not self.armed:
             return PilotSticks()
-        if self._state is None:
-            return self._cascade.level(_SINK if self.mode is Mode.LANDING else 0.0)
-        if self._mission is not None and self.mode is Mode.LANDING:
-            return self._cascade.level(_SINK)
+        lands = self.mode is Mode.LANDING
+        if self._state is None or (lands and (self._mission is not None or not self.navigation.aided)):
+            return self._cascade.level(_SINK if lands else 0.0)
         self.mission_s += dt_s
         self._guided.advance(dt_s)
         return self._cascade.fly(self.reference(), self._state, dt_s)

@@ -21,7 +21,7 @@ SILENCE_MS = 300
 SPACING_MS = 20
 _FRD = (20, 12)
 """MAV_FRAME_LOCAL_FRD and MAV_FRAME_BODY_FRD: ODOMETRY in any other pair of frames is passed over in silence."""
-_MOST_SIGMA_M, _MOST_SIGMA_RAD = 100.0, 1.5
+_MOST_SIGMA_M, _MOST_SIGMA_RAD, _MOST_SIGMA_M_S = 100.0, 1.5, 5.0
 _UINT32 = 1 << 32
 
 
@@ -61,6 +61,7 @@ class VisionSensor:
     """Turn messages into samples for the filter.
 
     What counts is the message, not its component: any of the own system id's may send vision.
+    met_nan: whether a variance was not a number, beside the first one; ArduPilot takes that for an error of its own.
     """
 
     def __init__(self, parameters: Parameters) -> None:
@@ -74,6 +75,7 @@ class VisionSensor:
         self.accepted = 0
         self.dropped = 0
         self.resets = 0
+        self.met_nan = False
 
     def take(
         self, message: Received, arrived_us: int, clock: JitterCorrection, filter_runs: bool
@@ -104,9 +106,13 @@ class VisionSensor:
         return self._arrived_ms is not None and now_ms - self._arrived_ms < SILENCE_MS
 
     def _pose_sample(self, pose: _Pose, t_ms: int, filter_runs: bool) -> list[PoseSample | SpeedSample]:
+        sigma_m, sigma_rad = _sigma(pose.covariance, (0, 6, 11)), _sigma(pose.covariance, (15, 18, 20))
+        self.met_nan |= math.isnan(sigma_m + sigma_rad)
+        if pose.quality < self._parameters["VISO_QUAL_MIN"]:
+            return []
         if pose.reset_counter != self._reset_counter:  # any change, up or down, within a message type or between two
             self._reset_counter, self._reset_ms = pose.reset_counter, self._arrived_ms or 0
-        if pose.quality < self._parameters["VISO_QUAL_MIN"] or not np.isfinite(pose.p_BinN).all():
+        if not np.isfinite(pose.p_BinN).all():
             return []
         if not filter_runs or _too_soon(t_ms, self._pose_ms):
             self.dropped += 1
@@ -116,14 +122,13 @@ class VisionSensor:
         self._seen_reset_ms = self._reset_ms
         self.resets += reset
         self.accepted += 1
-        sigma_m, sigma_rad = _sigma(pose.covariance, (0, 6, 11)), _sigma(pose.covariance, (15, 18, 20))
         return [
             PoseSample(
                 t_ms - round(self._parameters["VISO_DELAY_MS"]),
                 pose.p_BinN,
                 so3.to_euler(pose.R_FtoN)[2],
-                min(max(sigma_m, self._parameters["VISO_POS_M_NSE"]), _MOST_SIGMA_M),
-                min(max(sigma_rad, self._parameters["VISO_YAW_M_NSE"]), _MOST_SIGMA_RAD),
+                _within(sigma_m, self._parameters["VISO_POS_M_NSE"], _MOST_SIGMA_M),
+                _within(sigma_rad, self._parameters["VISO_YAW_M_NSE"], _MOST_SIGMA_RAD),
                 reset,
             )
         ]
@@ -137,7 +142,9 @@ class VisionSensor:
             return []
         self._speed_ms = t_ms
         floor = self._parameters["VISO_VEL_M_NSE"]
-        return [SpeedSample(t_ms - round(self._parameters["VISO_DELAY_MS"]), v_BinN, max(sigma, floor))]
+        return [
+            SpeedSample(t_ms - round(self._parameters["VISO_DELAY_MS"]), v_BinN, _within(sigma, floor, _MOST_SIGMA_M_S))
+        ]
 
 
 def _too_soon(t_ms: int, last_ms: int | None) -> bool:
@@ -180,9 +187,20 @@ def _speed(message: Received) -> tuple[Array, float, int] | None:
 
 
 def _sigma(covariance: list[float], places: tuple[int, int, int]) -> float:
-    """Return the root of the sum of three variances, as ArduPilot takes it; 0 where the first is not a number."""
+    """Return the root of the sum of three variances, as ArduPilot takes it; 0 where the first of all is not a number.
+
+    Where only another is none, or the sum is negative, neither is the root. 4.7 takes the cube root of the sum of
+    squares instead, which comes to the same below the floor.
+    """
     total = sum(covariance[place] for place in places)
-    return 0.0 if math.isnan(covariance[0]) or not total >= 0.0 else math.sqrt(total)
+    if math.isnan(covariance[0]):
+        return 0.0
+    return math.sqrt(total) if total >= 0.0 else math.nan
+
+
+def _within(sigma: float, least: float, most: float) -> float:
+    """Return sigma between its limits; their middle where it is not a number, as `constrain_float` has it."""
+    return (least + most) / 2.0 if math.isnan(sigma) else min(max(sigma, least), most)
 
 
 def _frames(fields: Mapping[str, FieldValue]) -> tuple[FieldValue, FieldValue]:
