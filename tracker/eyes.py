@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
+from tracker.album import Album
 from tracker.look import Fitted, Look, look_near
 from tracker.rig import Rig
 from tracker.rivals import first_rivals
@@ -25,6 +25,7 @@ class Eyes:
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
         self._rivals = [first_rivals() for _ in rig.cameras]
+        self._albums = [Album(camera) for camera in rig.cameras]
         self._turn = 0
         self._taught_blindly = False
 
@@ -38,9 +39,16 @@ class Eyes:
         """Return how long the slowest shutter stands open, as learned [s]."""
         return max(rivals.best.response.exposure_s for rivals in self._rivals)
 
+    @property
+    def _settled(self) -> bool:
+        """Say whether it is known how balls look, so that little is left to learn."""
+        return all(rivals.settled and rivals.best.light.count >= LEARN_ALL for rivals in self._rivals)
+
     def look(self, frames: Sequence[Frame], state: State) -> Look:
         """Find each ball in each image where a state expects it."""
-        look = look_near(frames, self._rig, state, [rivals.best for rivals in self._rivals])
+        for index, album in enumerate(self._albums):
+            album.draws_left = (self._turn % len(self._albums) == index) if self._settled else None
+        look = look_near(frames, self._rig, state, [rivals.best for rivals in self._rivals], self._albums)
         doubt_px = SMEAR_DOUBT * self._streak_px(state)
         return look.doubted(doubt_px) if doubt_px > SMEAR_DOUBT * BLIND_PX else look
 
@@ -60,12 +68,12 @@ class Eyes:
         self._turn += 1
         if self._taught_blindly and not blindly:
             self._taught_blindly = False
-            if any(math.hypot(*one.expected.streak_px) > LONG_STREAK_PX for one in fitted):
+            if any(one.streak_px > LONG_STREAK_PX for one in fitted):
                 self._rivals = [first_rivals() for _ in self._rig.cameras]
         self._taught_blindly |= blindly and not all(rivals.settled for rivals in self._rivals)
-        if all(rivals.settled and rivals.best.light.count >= LEARN_ALL for rivals in self._rivals):
+        if self._settled:
             fitted = [fitted[self._turn // LEARN_EVERY % len(fitted)]] if self._turn % LEARN_EVERY == 0 else []
         for one in fitted:
             index = one.frame.camera
             camera, image = self._rig.cameras[index], one.frame.image
-            self._rivals[index] = self._rivals[index].learned(image, camera, one.expected, one.centre)
+            self._rivals[index] = self._rivals[index].learned(image, camera, one.expected(camera), one.centre)

@@ -10,7 +10,7 @@ import numpy as np
 
 from tracker.compiled import compiled
 from tracker.solve import eliminate
-from tracker.template import MARGIN_PX, STREAK_MAX_PX, Shades, Streak
+from tracker.template import MARGIN_PX, STREAK_MAX_PX, Shades, Streak, Template
 from tracker.types import Array, Image
 
 RING_PX = 1.5  # the background's own variation is measured from this far beyond the ball's edge to the patch's corner
@@ -65,6 +65,8 @@ class Expected:
 
     uv_px: centre within about a pixel.  radius_px: from its size and distance.
     speed_px_s: how fast its image moves.  shades: see `template.Shades`.  response: its camera's.
+    drawn: templates of its brightness and its colour that serve for it; None for those of its own.
+    ray: (x, y, 1) leads to it from the camera; None where uv_px must tell.
     """
 
     uv_px: tuple[float, float]
@@ -72,6 +74,8 @@ class Expected:
     speed_px_s: tuple[float, float]
     shades: Shades
     response: Response
+    drawn: tuple[Template, Template] | None = None
+    ray: tuple[float, float] | None = None
 
     @property
     def streak_px(self) -> Streak:
