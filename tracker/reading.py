@@ -29,6 +29,37 @@ def _places_along(streak_u: float, streak_v: float, per_px: float) -> NDArray[np
     return places
 
 
+@compiled("void(Array(float32, 3, 'C', True), i8, i8, f8, i8[:, ::1], f8[:, ::1], f4[:, :, ::1])")
+def _gather(
+    fine: NDArray[np.float32], u_steps: int, v_steps: int, per_px: float, places: NDArray[np.int64], pixels: Array,
+    sums: NDArray[np.float32],
+) -> None:  # fmt: skip
+    """Fill in (5, p, n) each shape at each pixel and at its four neighbours on the grid, summed over all places.
+
+    They come in the order here, left, right, above, below. The rim, where all beyond is read, is empty.
+    """
+    size, shapes = len(fine), fine.shape[2]
+    middle, flat, last = size // 2, fine.reshape(size * size * shapes), size - 2
+    along, below = np.uint64(shapes), np.uint64(size * shapes)  # unsigned, so that no index is looked at for its sign
+    starts = np.empty(places.shape[1], np.uint64)
+    for i in range(pixels.shape[1]):
+        column, row = middle - u_steps + int(pixels[0, i] * per_px), middle - v_steps + int(pixels[1, i] * per_px)
+        for k in range(len(starts)):
+            c, r = min(max(column - places[0, k], 1), last), min(max(row - places[1, k], 1), last)
+            starts[k] = np.uint64((r * size + c) * shapes)
+        for p in range(shapes):
+            here = left = right = above = under = np.float32(0.0)
+            for k in range(len(starts)):
+                at = starts[k] + np.uint64(p)
+                here += flat[at]
+                left += flat[at - along]
+                right += flat[at + along]
+                above += flat[at - below]
+                under += flat[at + below]
+            sums[0, p, i], sums[1, p, i], sums[2, p, i] = here, left, right
+            sums[3, p, i], sums[4, p, i] = above, under
+
+
 @compiled(
     "void(Array(float32, 3, 'C', True), f8[::1], f8[::1], i8, f8, f8, f8[:, ::1],"
     "f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])"
@@ -50,34 +81,23 @@ def read(
     J(x - d) = J - d J' + d^2 J'' / 2, where r^2 J'' = r^2 lap J - r J' for a round picture. Blown up, its blur is too;
     what it then lacks of the variance acts by the heat equation, dI / d variance = lap I / 2.
     """
-    shapes, size, middle = len(value), len(fine), len(fine) // 2
     per_px, share = made[0], (ball[RADIUS] - made[1]) / ball[RADIUS]
     lacking = ball[variance] - made[2] * (ball[RADIUS] / made[1]) ** 2
     places = _places_along(ball[STREAK_U], ball[STREAK_V], per_px)
-    count, starts = places.shape[1], np.empty(places.shape[1], np.int64)
     u_steps, v_steps = round(u * per_px), round(v * per_px)
     off_u, off_v = u - u_steps / per_px, v - v_steps / per_px
     lacking += 0.5 * (off_u * off_u + off_v * off_v)  # of a step's second order what has no direction
-    slope, curve = per_px / (2.0 * count), per_px * per_px / (2.0 * count)
-    flat, along, below = fine.reshape(size * size * shapes), shapes, size * shapes
-    for i in range(pixels.shape[1]):
-        x, y = pixels[0, i] - u, pixels[1, i] - v
-        column, row = middle - u_steps + int(pixels[0, i] * per_px), middle - v_steps + int(pixels[1, i] * per_px)
-        d_u, d_v, wide = share * x + off_u, share * y + off_v, share * share * (x * x + y * y)
-        for k in range(count):  # the rim, where all beyond is read, is empty
-            c, r = min(max(column - places[0, k], 1), size - 2), min(max(row - places[1, k], 1), size - 2)
-            starts[k] = r * below + c * along
-        for p in range(shapes):
-            here = left = right = above = under = np.float32(0.0)
-            for k in range(count):
-                at = starts[k] + p
-                here += flat[at]
-                left += flat[at - along]
-                right += flat[at + along]
-                above += flat[at - below]
-                under += flat[at + below]
-            du, dv = slope * (left - right), slope * (above - under)
-            half = curve * (left + right + above + under - 4.0 * here)
+    n, mean = pixels.shape[1], 1.0 / places.shape[1]
+    sums = np.empty((5, len(value), n), np.float32)
+    _gather(fine, u_steps, v_steps, per_px, places, pixels, sums)
+    slope, curve = 0.5 * mean * per_px, 0.5 * mean * per_px * per_px
+    first, second = share + 0.5 * share * share, share * share
+    for p in range(len(value)):
+        for i in range(n):
+            x, y = pixels[0, i] - u, pixels[1, i] - v
+            du, dv = slope * (sums[1, p, i] - sums[2, p, i]), slope * (sums[3, p, i] - sums[4, p, i])
+            around = sums[1, p, i] + sums[2, p, i] + sums[3, p, i] + sums[4, p, i]
+            half = curve * (around - np.float32(4.0) * sums[0, p, i])
             by_u[p, i], by_v[p, i], bend[p, i] = du, dv, half
-            larger = 0.5 * share * share * (x * du + y * dv)
-            value[p, i] = here / count + d_u * du + d_v * dv + larger + (wide + lacking) * half
+            moved = (first * x + off_u) * du + (first * y + off_v) * dv
+            value[p, i] = mean * sums[0, p, i] + moved + (second * (x * x + y * y) + lacking) * half
