@@ -18,7 +18,7 @@ from tracker.template import Template, draw, sampling_of, steps_of
 from tracker.view import RADIUS, RAY_X, RAY_Y
 
 KEPT = 256  # templates, of about 100 kB each: what a flight through a room shows
-NEAR = 1  # steps of radius, blur and bearing
+NEAR = 1  # steps of radius and blur together, and of bearing
 
 
 class Wanted(NamedTuple):
@@ -83,11 +83,7 @@ class Album:
 
 
 def _near(serving: Wanted, wanted: Wanted) -> bool:
-    """Say whether a template is so like another that it can stand in for it."""
-    return (
-        abs(serving.radius_steps - wanted.radius_steps) <= NEAR
-        and abs(serving.blur_steps - wanted.blur_steps) <= NEAR
-        and abs(serving.x_steps - wanted.x_steps) <= NEAR
-        and abs(serving.y_steps - wanted.y_steps) <= NEAR
-        and serving.box_px == wanted.box_px
-    )
+    """Say whether a template is so like another that it can stand in for it: a step of radius or blur, not of both."""
+    apart = abs(serving.radius_steps - wanted.radius_steps) + abs(serving.blur_steps - wanted.blur_steps)
+    turned = max(abs(serving.x_steps - wanted.x_steps), abs(serving.y_steps - wanted.y_steps))
+    return apart <= NEAR and turned <= NEAR and serving.box_px == wanted.box_px
