@@ -46,8 +46,9 @@ class Eyes:
 
     def look(self, frames: Sequence[Frame], state: State) -> Look:
         """Find each ball in each image where a state expects it."""
+        whose = frames[self._turn % len(frames)].camera  # of those that see now: free-running ones are a round each
         for index, album in enumerate(self._albums):
-            album.draws_left = (self._turn % len(self._albums) == index) if self._settled else None
+            album.draws_left = int(index == whose) if self._settled else None
         look = look_near(frames, self._rig, state, [rivals.best for rivals in self._rivals], self._albums)
         doubt_px = SMEAR_DOUBT * self._streak_px(state)
         return look.doubted(doubt_px) if doubt_px > SMEAR_DOUBT * BLIND_PX else look
