@@ -9,7 +9,7 @@ import numpy as np
 
 from tracker.camera import Camera
 from tracker.centre import Centre
-from tracker.lesson import light_on, sharper
+from tracker.lesson import light_on, sample_of, sharper
 from tracker.light import Light, ray_frame
 from tracker.patch import Expected, Response, cut, detail_of, extent_of
 from tracker.template import FLAT, Shades
@@ -48,10 +48,9 @@ class Appearance:
 
     def expected_like(self, ball: Expected, camera: Camera, uv_px: Array) -> Expected:
         """Return what would be expected of a ball, seen at uv_px (2,), if it looked as is known here."""
-        x, y, z = camera.bearings(uv_px[None])[0].tolist()
-        shades = self.shades(camera, x / z, y / z)
         place = float(uv_px[0]), float(uv_px[1])
-        return replace(ball, uv_px=place, shades=shades, response=self.response)
+        shades = self.shades(camera, *_ray(ball, camera))
+        return replace(ball, uv_px=place, shades=shades, response=self.response, drawn=None)
 
     def learned(self, image: Image, camera: Camera, ball: Expected, found: Centre) -> Appearance:
         """Return what is known after one more ball.
@@ -63,21 +62,28 @@ class Appearance:
         if found.misfit > MISFIT_MAX:
             return self
         extent = extent_of(ball)
-        patch = cut(image, extent, ball.response)
         centre = float(found.uv_px[0]) - extent.u, float(found.uv_px[1]) - extent.v
-        response = sharper(patch, ball, centre, max(BLUR_STEP_PX, FIRST_STEP_PX / (1.0 + self.light.count / 3.0)))
+        sample = sample_of(cut(image, extent, ball.response), ball, centre)
+        response = sharper(sample, max(BLUR_STEP_PX, FIRST_STEP_PX / (1.0 + self.light.count / 3.0)))
         detail = response.detail + DETAIL_SHARE * (detail_of(image, extent) - response.detail)
         response = replace(response, detail=detail)
-        R_RtoW = ray_frame(camera.bearings(found.uv_px[None])[0], camera.R_CtoW)
-        equations = light_on(patch, ball, centre, self.light.lamp_seen(R_RtoW))
+        R_RtoW = ray_frame(*_ray(ball, camera), camera.R_CtoW)
+        equations = light_on(sample, self.light.lamp_seen(R_RtoW))
         light = self.light if equations is None else self.light.learned(*equations, R_RtoW)
         due = light.count in PUBLISH_AT or light.count % PUBLISH_AT[-1] == 0
         shown = light if due and light.trusted else self.shown
         return Appearance(response, light, shown)
 
 
+def _ray(ball: Expected, camera: Camera) -> tuple[float, float]:
+    """Return the ray (x, y, 1) to a ball: the one expected, or where its place in the image leads."""
+    if ball.ray is not None:
+        return ball.ray
+    x, y, z = camera.bearings(np.array([ball.uv_px]))[0].tolist()
+    return x / z, y / z
+
+
 @lru_cache(maxsize=4096)
 def _shades(light: Light, camera: Camera, x_steps: int, y_steps: int) -> Shades:
     """Return the shades along a rounded bearing; light and camera are told apart by identity."""
-    bearing = np.array([x_steps * BEARING_STEP_RAD, y_steps * BEARING_STEP_RAD, 1.0])
-    return light.shades(ray_frame(bearing / np.linalg.norm(bearing), camera.R_CtoW))
+    return light.shades(ray_frame(x_steps * BEARING_STEP_RAD, y_steps * BEARING_STEP_RAD, camera.R_CtoW))

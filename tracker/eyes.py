@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from tracker.album import Album
 from tracker.appearance import MISFIT_MAX
 from tracker.look import Fitted, Look, look_near
 from tracker.rig import Rig
 from tracker.rivals import first_rivals
+from tracker.sight import MISFIT
 from tracker.state import State
 from tracker.tint import Gains, Tint, core_colour
 from tracker.types import Array, Frame
-from tracker.view import unknown_streak_px
+from tracker.view import RADIUS, unknown_streak_px
 
 LIGHT_BALLS = 2  # a single ball that is something else would tell of a light that is not there
 LEARN_ALL = 72  # balls of each camera; then
@@ -29,6 +30,7 @@ class Eyes:
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
         self._rivals = [first_rivals() for _ in rig.cameras]
+        self._albums = [Album(camera) for camera in rig.cameras]
         self._tints = [Tint() for _ in rig.cameras]
         self._turn = 0
         self._taught_blindly = False
@@ -44,9 +46,14 @@ class Eyes:
         return max(rivals.best.response.exposure_s for rivals in self._rivals)
 
     @property
+    def _settled(self) -> bool:
+        """Say whether it is known how balls look, so that little is left to learn."""
+        return all(rivals.settled and rivals.best.light.count >= LEARN_ALL for rivals in self._rivals)
+
+    @property
     def gains(self) -> tuple[Gains, ...]:
         """Return the colour of the light in each camera."""
-        return tuple(tint.gains for tint in self._tints)
+        return tuple([tint.gains for tint in self._tints])
 
     def other_gains(self, number: int) -> tuple[Gains, ...]:
         """Return another light to look for balls under, for each camera; numbers go round, the nearest first."""
@@ -58,7 +65,10 @@ class Eyes:
 
     def look(self, frames: Sequence[Frame], state: State) -> Look:
         """Find each ball in each image where a state expects it."""
-        look = look_near(frames, self._rig, state, [rivals.best for rivals in self._rivals], self.gains)
+        whose = frames[self._turn % len(frames)].camera  # of those that see now: free-running ones are a round each
+        for index, album in enumerate(self._albums):
+            album.draws_left = int(index == whose) if self._settled else None
+        look = look_near(frames, self._rig, state, [rivals.best for rivals in self._rivals], self._albums, self.gains)
         doubt_px = SMEAR_DOUBT * self._streak_px(state)
         return look.doubted(doubt_px) if doubt_px > SMEAR_DOUBT * BLIND_PX else look
 
@@ -79,24 +89,27 @@ class Eyes:
         self._follow_the_light(fitted)
         if self._taught_blindly and not blindly:
             self._taught_blindly = False
-            if any(math.hypot(*one.expected.streak_px) > LONG_STREAK_PX for one in fitted):
+            if any(one.streak_px > LONG_STREAK_PX for one in fitted):
                 self._rivals = [first_rivals() for _ in self._rig.cameras]
         self._taught_blindly |= blindly and not all(rivals.settled for rivals in self._rivals)
-        if all(rivals.settled and rivals.best.light.count >= LEARN_ALL for rivals in self._rivals):
+        if self._settled:
             fitted = [fitted[self._turn // LEARN_EVERY % len(fitted)]] if self._turn % LEARN_EVERY == 0 else []
         for one in fitted:
             index = one.frame.camera
             camera, image = self._rig.cameras[index], one.frame.image
-            self._rivals[index] = self._rivals[index].learned(image, camera, one.expected, one.centre)
+            self._rivals[index] = self._rivals[index].learned(image, camera, one.expected(camera), one.centre)
 
     def _follow_the_light(self, fitted: Sequence[Fitted]) -> None:
-        """Learn each camera's light from the colours of the balls that it sees well."""
-        for camera, tint in enumerate(self._tints):
-            seen = [one for one in fitted if one.frame.camera == camera and one.centre.misfit <= MISFIT_MAX]
-            if len(seen) >= LIGHT_BALLS:
-                self._tints[camera] = tint.learned([(one.sighting.ball, _colour(one)) for one in seen])
+        """Learn the light of one of the cameras that see now, in turn, from the colours of the balls it sees well."""
+        cameras = sorted({one.frame.camera for one in fitted})
+        if not cameras:
+            return
+        camera = cameras[self._turn % len(cameras)]
+        seen = [one for one in fitted if one.frame.camera == camera and float(one.fit[MISFIT]) <= MISFIT_MAX]
+        if len(seen) >= LIGHT_BALLS:
+            self._tints[camera] = self._tints[camera].learned([(one.sighting.ball, _colour(one)) for one in seen])
 
 
 def _colour(one: Fitted) -> Array:
-    u, v = one.centre.uv_px.tolist()
-    return core_colour(one.frame.image, u, v, one.expected.radius_px)
+    u, v = one.sighting.uv_px.tolist()
+    return core_colour(one.frame.image, u, v, one.view[RADIUS])

@@ -8,10 +8,13 @@ and the shaded limb no longer pulls its centre towards the lamp.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from tracker.compiled import compiled
+from tracker.solve import cholesky, solve
 from tracker.template import GLOSS, TERMS, Shades, Vector
 from tracker.types import Array
 
@@ -52,16 +55,12 @@ class Light:
                 the lamp of `lamp_seen`, scaled to mean brightness 1.
             R_RtoW: (3, 3) turns the ray's frame into the room.
         """
-        T = np.eye(TERMS)
-        T[1:4, 1:4] = T[4:7, 4:7] = R_RtoW
-        information = FORGETTING * self.information + T @ information @ T.T
-        target = FORGETTING * self.target + T @ target
-        ridge = np.diag(RIDGE * information[0, 0] + 1e-9)
-        terms = np.asarray(np.linalg.solve(information + ridge, target), dtype=np.float64)
+        after, aim = FORGETTING * self.information, FORGETTING * self.target
+        terms = _with_one_more(after, aim, information, target, np.ascontiguousarray(R_RtoW), RIDGE)
         pull = terms[1:4] + terms[4:7]
         length = float(np.linalg.norm(terms[4:7]))
         lamp = np.asarray(terms[4:7] / length) if length > 0.0 and float(pull @ terms[4:7]) > 0.0 else self.lamp
-        return Light(lamp, terms, information, target, self.count + 1)
+        return Light(lamp, terms, after, aim, self.count + 1)
 
     def faded(self) -> Light:
         """Return the same light, less sure of it."""
@@ -80,12 +79,29 @@ class Light:
         return Shades(self.lamp_seen(R_RtoW), (COVERAGE, matt, MIRROR))
 
 
-def ray_frame(bearing_inC: Array, R_CtoW: Array) -> Array:
-    """Return R_RtoW (3, 3) of the frame in which a ball's image is drawn.
+@compiled("f8[::1](f8[:, ::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[::1])")
+def _with_one_more(information: Array, target: Array, more: Array, aim: Array, R_RtoW: Array, ridge: Array) -> Array:
+    """Add one ball's normal equations, turned into the room, in place; return the terms that solve them."""
+    turn = np.eye(TERMS)
+    turn[1:4, 1:4] = R_RtoW
+    turn[4:7, 4:7] = R_RtoW
+    information += turn @ more @ turn.T
+    target += turn @ aim
+    factor, terms = information.copy(), target.copy()
+    for i in range(TERMS):
+        factor[i, i] += ridge[i] * information[0, 0] + 1e-9
+    cholesky(factor)
+    solve(factor, terms)
+    return terms
+
+
+def ray_frame(x: float, y: float, R_CtoW: Array) -> Array:
+    """Return R_RtoW (3, 3) of the frame in which a ball's image is drawn, seen along the ray (x, y, 1).
 
     R: x right, y down in the image, z from the ball towards the camera, which makes it left-handed as images are.
     """
-    x = np.array([bearing_inC[2], 0.0, -bearing_inC[0]])
-    x /= np.sqrt(x[0] ** 2 + x[2] ** 2)
-    y = np.cross(bearing_inC, x)
-    return np.asarray(R_CtoW @ np.column_stack((x, y, -bearing_inC)))
+    flat, whole = math.sqrt(1.0 + x * x), math.sqrt(1.0 + x * x + y * y)
+    both = flat * whole
+    right, down = (1.0 / flat, 0.0, -x / flat), (-x * y / both, flat * flat / both, -y / both)
+    back = -x / whole, -y / whole, -1.0 / whole
+    return np.asarray(R_CtoW @ np.array((right, down, back)).T)

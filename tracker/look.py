@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tracker.album import Album
 from tracker.appearance import Appearance
 from tracker.camera import Camera
 from tracker.centre import Centre
@@ -15,23 +16,47 @@ from tracker.colour_table import colours_of
 from tracker.detect import Blob, find_blobs
 from tracker.patch import Expected
 from tracker.rig import Rig
-from tracker.sight import Sight, find_ball
+from tracker.sight import COV, MISFIT, SIZE, SPOT, UV, find_ball, known_of
 from tracker.state import State
+from tracker.template import Template
 from tracker.tint import NEUTRAL, Gains
-from tracker.types import BallSighting, Frame, Reason, Rejected, frozen_array
-from tracker.view import DEPTH, RAY_X, RAY_Y, U, V, expected_views
+from tracker.types import Array, BallSighting, Frame, Reason, Rejected, frozen_array
+from tracker.view import DEPTH, RADIUS, RAY_X, RAY_Y, SPEED_U, SPEED_V, U, V, expected_views
 
 NEAREST_M = 0.3  # a ball closer to a camera than this is not looked for
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fitted:
-    """A sighting with its frame, what was expected of the ball and what the fit gave: what `Appearance` learns from."""
+    """A sighting, and what `Appearance` learns from.
+
+    view: a row of `view.expected_views`.  fit (sight.SIZE,): what was found.
+    appearance, drawn: what it was taken to look like.
+    """
 
     sighting: BallSighting
     frame: Frame
-    expected: Expected
-    centre: Centre
+    view: Sequence[float]
+    fit: Array
+    appearance: Appearance
+    drawn: tuple[Template, Template]
+
+    def expected(self, camera: Camera) -> Expected:
+        """Return what was expected of the ball, from its coloured spot's middle. camera: the frame's."""
+        view, (u, v) = self.view, self.fit[SPOT].tolist()
+        ray, speed_px_s = (view[RAY_X], view[RAY_Y]), (view[SPEED_U], view[SPEED_V])
+        shades = self.appearance.shades(camera, *ray)
+        return Expected((u, v), view[RADIUS], speed_px_s, shades, self.appearance.response, self.drawn, ray)
+
+    @property
+    def streak_px(self) -> float:
+        """Return how far the ball's image moved during the exposure [px]."""
+        return math.hypot(self.view[SPEED_U], self.view[SPEED_V]) * self.appearance.response.exposure_s
+
+    @property
+    def centre(self) -> Centre:
+        """Return what the fit gave."""
+        return Centre(self.fit[UV], self.fit[COV].reshape(2, 2), float(self.fit[MISFIT]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +79,7 @@ def look_near(
     rig: Rig,
     state: State,
     appearances: Sequence[Appearance],
+    albums: Sequence[Album],
     gains: Sequence[Gains] = (),
 ) -> Look:
     """Find each ball in each image, in the region where a state, with its covariance, expects it.
@@ -61,39 +87,43 @@ def look_near(
     Args:
         frames: of different cameras, at about one time.
         state: carried to about that time.
-        appearances: how balls look to each camera of the rig.
+        appearances, albums: how balls look to each camera of the rig, and their templates.
         gains: of the light in each camera; none for the config's light.
     """
     fitted: list[Fitted] = []
     rejections: list[Rejected] = []
     for frame in frames:
-        light = gains[frame.camera] if gains else NEUTRAL
-        for b, found in _balls_of(frame, rig, state, appearances[frame.camera], light):
+        c = frame.camera
+        light = gains[c] if gains else NEUTRAL
+        for found in _balls_of(frame, rig, state, appearances[c], albums[c], light):
             if isinstance(found, Rejected):
                 rejections.append(found)
             else:
-                sighting = BallSighting(frame.camera, b, frame.t_ns, found.centre.uv_px, found.centre.cov_px)
-                fitted.append(Fitted(sighting, frame, found.expected, found.centre))
+                fitted.append(found)
     return Look(tuple(fitted), tuple(rejections))
 
 
 def _balls_of(
-    frame: Frame, rig: Rig, state: State, appearance: Appearance, gains: Gains
-) -> Iterator[tuple[int, Sight | Rejected]]:
+    frame: Frame, rig: Rig, state: State, appearance: Appearance, album: Album, gains: Gains
+) -> Iterator[Fitted | Rejected]:
     """Yield each ball of the marker as seen near its prediction, or why it is not."""
-    camera = rig.cameras[frame.camera]
-    views = expected_views(state, rig, frame.camera, frame.t_ns).tolist()
-    for b, (ball, view) in enumerate(zip(rig.marker.balls, views, strict=True)):
+    rows = expected_views(state, rig, frame.camera, frame.t_ns)
+    known, fits = known_of(appearance.response), np.empty((len(rows), SIZE))
+    fixed = fits.view()
+    fixed.flags.writeable = False
+    for b, (ball, view) in enumerate(zip(rig.marker.balls, rows.tolist(), strict=True)):
         if not (math.isfinite(view[U]) and math.isfinite(view[V]) and view[DEPTH] >= NEAREST_M):
-            yield b, Rejected(Reason.BEHIND, f"{ball.name} is not before the camera", frame.t_ns, frame.camera)
+            yield Rejected(Reason.BEHIND, f"{ball.name} is not before the camera", frame.t_ns, frame.camera)
             continue
-        shades = appearance.shades(camera, view[RAY_X], view[RAY_Y])
-        found = find_ball(frame.image, colours_of((ball,), gains), view, shades, appearance.response)
-        if isinstance(found, Reason):
+        drawn = album.serve(b, view, appearance)
+        failed = find_ball(frame.image, colours_of((ball,), gains), rows[b], known, drawn, fits[b])
+        if failed is not None:
             detail = f"no {ball.name} at ({view[U]:.0f}, {view[V]:.0f}) px, where it is expected"
-            yield b, Rejected(found, detail, frame.t_ns, frame.camera)
+            yield Rejected(failed, detail, frame.t_ns, frame.camera)
         else:
-            yield b, found
+            fit = fixed[b]
+            sighting = BallSighting(frame.camera, b, frame.t_ns, fit[UV], fit[COV].reshape(2, 2))
+            yield Fitted(sighting, frame, view, fit, appearance, drawn)
 
 
 def look_everywhere(frame: Frame, camera: Camera, rig: Rig, gains: Gains = NEUTRAL) -> list[list[Blob]]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from tracker.compiled import compiled
 from tracker.solve import eliminate
-from tracker.template import MARGIN_PX, STREAK_MAX_PX, Shades, Streak
+from tracker.template import MARGIN_PX, STREAK_MAX_PX, Shades, Streak, Template
 from tracker.types import Array, Image
 
 RING_PX = 1.5  # the background's own variation is measured from this far beyond the ball's edge to the patch's corner
@@ -65,6 +65,8 @@ class Expected:
 
     uv_px: centre within about a pixel.  radius_px: from its size and distance.
     speed_px_s: how fast its image moves.  shades: see `template.Shades`.  response: its camera's.
+    drawn: templates of its brightness and its colour that serve for it; None for those of its own.
+    ray: (x, y, 1) leads to it from the camera; None where uv_px must tell.
     """
 
     uv_px: tuple[float, float]
@@ -72,6 +74,8 @@ class Expected:
     speed_px_s: tuple[float, float]
     shades: Shades
     response: Response
+    drawn: tuple[Template, Template] | None = None
+    ray: tuple[float, float] | None = None
 
     @property
     def streak_px(self) -> Streak:
@@ -126,18 +130,40 @@ def trust_of(gamma: float) -> Array:
     return np.asarray(1.0 / (gamma * share ** (gamma - 1.0)))
 
 
-@compiled("void(Array(uint8, 3, 'C', True), i8, i8, i8, f8[::1])")
-def _colour_of_block(image: Image, left: int, top: int, block: int, colour: Array) -> None:
-    """Fill in the mean luma, blue and red difference (ITU-R BT.601) of a block of pixels, in grey levels."""
-    b = g = r = 0.0
+@compiled("UniTuple(f8, 3)(Array(uint8, 3, 'C', True), i8, i8, i8)")
+def _colour_of_block(image: Image, left: int, top: int, block: int) -> tuple[float, float, float]:
+    """Return the mean luma, blue and red difference (ITU-R BT.601) of a block of pixels, in grey levels."""
+    b = g = r = 0
     for v in range(top, top + block):
         for u in range(left, left + block):
-            b += image[v, u, 0] / block**2
-            g += image[v, u, 1] / block**2
-            r += image[v, u, 2] / block**2
-    colour[0] = 0.114 * b + 0.587 * g + 0.299 * r
-    colour[1] = 0.5 * b - 0.331264 * g - 0.168736 * r
-    colour[2] = -0.081312 * b - 0.418688 * g + 0.5 * r
+            b += image[v, u, 0]
+            g += image[v, u, 1]
+            r += image[v, u, 2]
+    share = 1.0 / (block * block)
+    luma = share * (0.114 * b + 0.587 * g + 0.299 * r)
+    blue = share * (0.5 * b - 0.331264 * g - 0.168736 * r)
+    return luma, blue, share * (-0.081312 * b - 0.418688 * g + 0.5 * r)
+
+
+@compiled("void(f8[:, ::1], f8, f8, f8, f8, i8)")
+def _add_products(products: Array, x: float, y: float, a: float, b: float, count: int) -> None:
+    """Add to the lower triangle of the products of 1, x, y, a and, with a count of 5, b."""
+    products[0, 0] += 1.0
+    products[1, 0] += x
+    products[1, 1] += x * x
+    products[2, 0] += y
+    products[2, 1] += x * y
+    products[2, 2] += y * y
+    products[3, 0] += a
+    products[3, 1] += a * x
+    products[3, 2] += a * y
+    products[3, 3] += a * a
+    if count == 5:
+        products[4, 0] += b
+        products[4, 1] += b * x
+        products[4, 2] += b * y
+        products[4, 3] += b * a
+        products[4, 4] += b * b
 
 
 @compiled("void(Array(uint8, 3, 'C', True), i8, i8, i8, i8, f8, f8, f8, f8[::1])")
@@ -149,25 +175,20 @@ def _whitening(
     Luma varies by pixel, colour by block; colour is made white by Cholesky's factor.
     """
     bright, colour = np.zeros((4, 4)), np.zeros((5, 5))  # products of 1, x, y, luma; of 1, x, y, blue, red
-    one, mean = np.ones(5), np.empty(3)
     for top in range(v - half + ((v - half) % block), v + half - block + 2, block):
         for left in range(u - half + ((u - half) % block), u + half - block + 2, block):
             x, y = left + (block - 1) / 2 - u, top + (block - 1) / 2 - v
             if (x - du) ** 2 + (y - dv) ** 2 <= beyond_px**2:
                 continue
-            _colour_of_block(image, left, top, block, mean)
-            one[1], one[2], one[3], one[4] = x, y, mean[1], mean[2]
-            for i in range(5):
-                for j in range(i + 1):
-                    colour[i, j] += one[i] * one[j]
+            luma, blue, red = _colour_of_block(image, left, top, block)
+            _add_products(colour, x, y, blue, red, 5)
+            if block == 1:
+                _add_products(bright, x, y, luma, 0.0, 4)
+                continue
             for row in range(top, top + block):
                 for column in range(left, left + block):
-                    one[1], one[2] = column - u, row - v
-                    pixel = image[row, column]
-                    one[3] = 0.114 * pixel[0] + 0.587 * pixel[1] + 0.299 * pixel[2]
-                    for i in range(4):
-                        for j in range(i + 1):
-                            bright[i, j] += one[i] * one[j]
+                    luma, _, _ = _colour_of_block(image, column, row, 1)
+                    _add_products(bright, float(column - u), float(row - v), luma, 0.0, 4)
     eliminate(bright, 3)
     eliminate(colour, 3)
     least, freedom = LEAST_NOISE**2, max(colour[0, 0] - 3.0, 1.0)
@@ -196,6 +217,7 @@ def cut_pixels(
     """Cut out and whiten; (u, v) is the middle pixel, (du, dv) the ball's place from there. See `Patch`."""
     pixels = (2 * half + 1) ** 2
     bright, colour, scale, count = np.empty((4, pixels)), np.empty((5, pixels)), np.zeros(4), 0
+    share = 1.0 / (block * block)
     _whitening(image, u, v, half, block, du, dv, edge_px + RING_PX, scale)
     for top in range(v - half + ((v - half) % block), v + half - block + 2, block):
         for left in range(u - half + ((u - half) % block), u + half - block + 2, block):
@@ -204,17 +226,18 @@ def cut_pixels(
                 continue
             mean = blue = red = 0.0
             clipped = False
-            for k in range(block**2):
-                row, column = top + k // block, left + k % block
+            for k in range(block * block):
+                down = k >> (block - 1)  # of a block of two; of one both are 0
+                row, column = top + down, left + k - block * down
                 b, g, r = image[row, column, 0], image[row, column, 1], image[row, column, 2]
                 lb, lg, lr = light[b], light[g], light[r]
                 brightness = 0.114 * b + 0.587 * g + 0.299 * r
                 full = max(b, g, r) >= CLIPPED
                 clipped = clipped or full
-                mean += brightness / block**2
-                blue += (0.5 * lb - 0.331264 * lg - 0.168736 * lr) / block**2
-                red += (-0.081312 * lb - 0.418688 * lg + 0.5 * lr) / block**2
-                i = block**2 * count + k
+                mean += share * brightness
+                blue += share * (0.5 * lb - 0.331264 * lg - 0.168736 * lr)
+                red += share * (-0.081312 * lb - 0.418688 * lg + 0.5 * lr)
+                i = block * block * count + k
                 bright[X, i] = column - u
                 bright[Y, i] = row - v
                 bright[TRUST, i] = trust[int(brightness + 0.5)] * (CLIPPED_TRUST if full else 1.0)
@@ -241,12 +264,12 @@ def cut(image: Image, extent: Extent, response: Response) -> Patch:
 @compiled("f8(Array(uint8, 3, 'C', True), i8, i8, i8)")
 def _detail(image: Image, u: int, v: int, half: int) -> float:
     """Compare neighbours in a row, in the same block of 2 x 2 pixels and in two."""
-    here, there, squares = np.empty(3), np.empty(3), np.zeros(2)
+    squares = np.zeros(2)
     for row in range(v - half, v + half + 1):
         for column in range(u - half, u + half):
-            _colour_of_block(image, column, row, 1, here)
-            _colour_of_block(image, column + 1, row, 1, there)
-            squares[column % 2] += (here[1] - there[1]) ** 2 + (here[2] - there[2]) ** 2
+            _, blue, red = _colour_of_block(image, column, row, 1)
+            _, next_blue, next_red = _colour_of_block(image, column + 1, row, 1)
+            squares[column % 2] += (blue - next_blue) ** 2 + (red - next_red) ** 2
     return float(squares[0] / max(squares[1], 1.0))
 
 

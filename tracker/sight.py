@@ -3,117 +3,134 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.centre import MAX_SHIFT_PX, Centre, gauss_newton
+from tracker.centre import MAX_SHIFT_PX
 from tracker.colour_table import ColourTable
 from tracker.compiled import compiled
-from tracker.patch import Expected, Response, cut_pixels, edge_of, light_of, trust_of
+from tracker.newton import gauss_newton
+from tracker.patch import Response, cut_pixels, light_of, trust_of
+from tracker.reading import BALL_SIZE, CHROMA_VAR, LUMA_VAR, STREAK_U, STREAK_V
+from tracker.reading import RADIUS as BALL_RADIUS
 from tracker.spots import find_spots
-from tracker.template import MARGIN_PX, Shades, places_along, template_for
+from tracker.template import MARGIN_PX, STREAK_MAX_PX, Template, variance_of
 from tracker.types import Array, Image, Reason
-from tracker.view import RAY_X
+from tracker.view import RADIUS, S_UU, S_UV, S_VV, SPEED_U, SPEED_V, U, V
 
 REGION_SIGMA = 3.5
 REGION_MARGIN_PX = 3.0
 LEAST_AREA_SHARE, MOST_AREA_SHARE = 0.15, 4.0  # of the ball's expected disc
-_UV, _COV, _MISFIT, _SPOT = 0, 1, 3, 4  # rows of what a fit gives
+UV, COV, MISFIT, SPOT, SIZE = slice(0, 2), slice(2, 6), 6, slice(7, 9), 9
+"""What a fit gives: the centre [px], its covariance (uu, uv, vu, vv) [px^2], chi2 per degree of freedom, and the
+coloured spot's middle [px]."""
+_MISFIT, _SPOT_U, _SPOT_V = 6, 7, 8
 _FOUND, _NO_COLOUR, _OUT_OF_VIEW, _CUT_OFF, _RAN_AWAY = range(5)
 _REASONS = {
     _NO_COLOUR: Reason.NO_BALL, _OUT_OF_VIEW: Reason.AT_BORDER, _CUT_OFF: Reason.AT_BORDER, _RAN_AWAY: Reason.NO_BALL,
 }  # fmt: skip
 
+Known = tuple[Array, int, Array, Array]
+"""Of a camera: variances of its blurs [px^2] and exposure [s], side of its blocks, light and trust of grey levels."""
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Sight:
-    """A ball found: what was expected of it, from its coloured spot's middle, and what its fit gave."""
 
-    expected: Expected
-    centre: Centre
+def known_of(response: Response) -> Known:
+    """Return how a camera answers to light, as compiled code takes it."""
+    block = response.block_px
+    variances = variance_of(response.luma_px, 1), variance_of(response.chroma_px, block)
+    return np.array((*variances, response.exposure_s)), block, light_of(response.gamma), trust_of(response.gamma)
 
 
 def find_ball(
-    image: Image, colour: ColourTable, view: Sequence[float], shades: Shades, response: Response
-) -> Sight | Reason:
+    image: Image, colour: ColourTable, view: Array, known: Known, drawn: tuple[Template, Template], fit: Array
+) -> Reason | None:
     """Find a ball near a prediction and fit its centre.
 
     Args:
         image: (height, width, 3) BGR.
         colour: of this ball alone.
         view: a row of `view.expected_views`, finite.
-        shades, response: see `patch.Expected`.
+        known: of the camera.
+        drawn: the templates of its brightness and of its colour.
+        fit (SIZE,): filled in.
     Returns:
-        Sight; NO_BALL when nothing of its colour and size is there or the fit runs away, AT_BORDER when it is cut off.
+        None; NO_BALL when nothing of its colour and size is there or the fit runs away, AT_BORDER when it is cut off.
     """
-    u, v, S_uu, S_uv, S_vv, radius_px, speed_u, speed_v = view[:RAY_X]
-    streak_px = speed_u * response.exposure_s, speed_v * response.exposure_s
-    edge_px = edge_of(radius_px, streak_px)
-    half = math.ceil(edge_px + MARGIN_PX)
-    luma = template_for(radius_px, response.luma_px, shades)
-    chroma = template_for(radius_px, response.chroma_px, shades, response.block_px)
-    fit = np.empty((5, 2))
+    luma, chroma = drawn
     status = _find_and_fit(
-        image, colour.least_spread, colour.lowest_spread, colour.hues, u, v, S_uu, S_uv, S_vv, radius_px, edge_px, half,
-        response.block_px, colour.blue, colour.red, light_of(response.gamma), trust_of(response.gamma), luma.fine,
-        chroma.fine, luma.per_px, luma.radius_px, places_along(streak_px, luma.per_px), fit,
+        image, colour.least_spread, colour.lowest_spread, colour.hues, colour.blue, colour.red, view, *known, luma.fine,
+        luma.made, chroma.fine, chroma.made, fit,
     )  # fmt: skip
-    if status != _FOUND:
-        return _REASONS[status]
-    fit.flags.writeable = False
-    spot = float(fit[_SPOT, 0]), float(fit[_SPOT, 1])
-    expected = Expected(spot, radius_px, (speed_u, speed_v), shades, response)
-    return Sight(expected, Centre(fit[_UV], fit[_COV : _COV + 2], float(fit[_MISFIT, 0])))
+    return None if status == _FOUND else _REASONS[status]
+
+
+@compiled("f8[::1](f8[::1], f8[::1])")
+def _ball_of(view: Array, answers: Array) -> Array:
+    """Return what is known of a ball, see `reading.BALL_SIZE`."""
+    ball = np.empty(BALL_SIZE)
+    ball[BALL_RADIUS], ball[LUMA_VAR], ball[CHROMA_VAR] = view[RADIUS], answers[0], answers[1]
+    ball[STREAK_U], ball[STREAK_V] = view[SPEED_U] * answers[2], view[SPEED_V] * answers[2]
+    return ball
 
 
 @compiled(
-    "i8(Array(u1, 3, 'C', True), Array(i2, 2, 'C', True), Array(i2, 1, 'C', True), Array(b1, 2, 'C', True), f8, f8,"
-    "f8, f8, f8, f8, f8, i8, i8, i8, i8, f8[::1], f8[::1], Array(f4, 3, 'C', True), Array(f4, 3, 'C', True), i8, f8,"
-    "i8[:, ::1], f8[:, ::1])"
+    "UniTuple(f8, 2)(Array(u1, 3, 'C', True), Array(i2, 2, 'C', True), Array(i2, 1, 'C', True),"
+    "Array(b1, 2, 'C', True), i8, i8, f8[::1])"
 )
-def _find_and_fit(
+def _nearest_spot(
     image: Image, least_spread: NDArray[np.int16], lowest_spread: NDArray[np.int16], hues: NDArray[np.bool_],
-    u: float, v: float, S_uu: float, S_uv: float, S_vv: float, radius_px: float, edge_px: float, half: int,
-    block: int, blue: int, red: int, light: Array, trust: Array, luma: NDArray[np.float32], chroma: NDArray[np.float32],
-    per_px: int, drawn_px: float, places: NDArray[np.int64], fit: Array,
-) -> int:  # fmt: skip
-    """Find the spot nearest the prediction, cut its pixels out and fit them.
-
-    Fills in fit (5, 2): centre, its covariance (2, 2), misfit (with nothing beside it), the spot's middle; returns how
-    it went.
-    """
-    height, width = image.shape[0], image.shape[1]
-    half_u = REGION_SIGMA * np.sqrt(S_uu) + radius_px + REGION_MARGIN_PX
-    half_v = REGION_SIGMA * np.sqrt(S_vv) + radius_px + REGION_MARGIN_PX
+    blue: int, red: int, view: Array,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the middle of the spot nearest the prediction; NaN when there is none, infinity out of view."""
+    height, width, u, v, radius_px = image.shape[0], image.shape[1], view[U], view[V], view[RADIUS]
+    half_u = REGION_SIGMA * np.sqrt(view[S_UU]) + radius_px + REGION_MARGIN_PX
+    half_v = REGION_SIGMA * np.sqrt(view[S_VV]) + radius_px + REGION_MARGIN_PX
     left, top = max(0, math.floor(u - half_u)), max(0, math.floor(v - half_v))
     right, bottom = min(width, math.ceil(u + half_u) + 1), min(height, math.ceil(v + half_v) + 1)
     if not (left < right and top < bottom):
-        return _OUT_OF_VIEW
+        return np.inf, np.inf
     area = math.pi * radius_px**2
     most_px = MOST_AREA_SHARE * area
     spots = find_spots(image, left, top, right, bottom, least_spread, lowest_spread, hues, blue, red, most_px)
-    nearest, least = -1, np.inf
+    nearest_u, nearest_v, least = np.nan, np.nan, np.inf
     for k in range(len(spots)):
         du, dv = spots[k, 1] - u, spots[k, 2] - v
-        distance2 = S_vv * du * du - 2.0 * S_uv * du * dv + S_uu * dv * dv
+        distance2 = view[S_VV] * du * du - 2.0 * view[S_UV] * du * dv + view[S_UU] * dv * dv
         if spots[k, 3] >= LEAST_AREA_SHARE * area and distance2 < least:
-            nearest, least = k, distance2
-    if nearest < 0:
+            nearest_u, nearest_v, least = spots[k, 1], spots[k, 2], distance2
+    return nearest_u, nearest_v
+
+
+@compiled(
+    "i8(Array(u1, 3, 'C', True), Array(i2, 2, 'C', True), Array(i2, 1, 'C', True), Array(b1, 2, 'C', True), i8, i8,"
+    "f8[::1], f8[::1], i8, f8[::1], f8[::1], Array(f4, 3, 'C', True), f8[::1], Array(f4, 3, 'C', True), f8[::1],"
+    "f8[::1])"
+)
+def _find_and_fit(
+    image: Image, least_spread: NDArray[np.int16], lowest_spread: NDArray[np.int16], hues: NDArray[np.bool_],
+    blue: int, red: int, view: Array, answers: Array, block: int, light: Array, trust: Array,
+    luma: NDArray[np.float32], luma_made: Array, chroma: NDArray[np.float32], chroma_made: Array, fit: Array,
+) -> int:  # fmt: skip
+    """Find the spot nearest the prediction, cut its pixels out and fit them; fill in fit (SIZE,), say how it went."""
+    height, width = image.shape[0], image.shape[1]
+    spot_u, spot_v = _nearest_spot(image, least_spread, lowest_spread, hues, blue, red, view)
+    if np.isnan(spot_u):
         return _NO_COLOUR
-    spot_u, spot_v = spots[nearest, 1], spots[nearest, 2]
-    middle_u, middle_v = round(spot_u), round(spot_v)
+    if np.isinf(spot_u):
+        return _OUT_OF_VIEW
+    ball, found = _ball_of(view, answers), np.empty(6)
+    streak_px = math.sqrt(ball[STREAK_U] ** 2 + ball[STREAK_V] ** 2)
+    edge_px = ball[BALL_RADIUS] + min(streak_px, STREAK_MAX_PX) / 2.0  # as `patch.edge_of`
+    half, middle_u, middle_v = math.ceil(edge_px + MARGIN_PX), round(spot_u), round(spot_v)
     if not (half <= middle_u < width - half and half <= middle_v < height - half):
         return _CUT_OFF
-    du, dv, found = spot_u - middle_u, spot_v - middle_v, np.empty(6)
+    du, dv = spot_u - middle_u, spot_v - middle_v
     bright, colour = cut_pixels(image, middle_u, middle_v, half, block, du, dv, edge_px, light, trust)
-    gauss_newton(bright, colour, luma, chroma, per_px, drawn_px, radius_px, places, du, dv, found)
+    gauss_newton(bright, colour, luma, luma_made, chroma, chroma_made, ball, du, dv, found)
     if not (found[0] - du) ** 2 + (found[1] - dv) ** 2 <= MAX_SHIFT_PX**2:
         return _RAN_AWAY
-    fit[_UV, 0], fit[_UV, 1] = found[0] + middle_u, found[1] + middle_v
-    fit[_COV, 0], fit[_COV, 1], fit[_COV + 1, 0], fit[_COV + 1, 1] = found[2], found[3], found[3], found[4]
-    fit[_MISFIT, 0], fit[_MISFIT, 1] = found[5], 0.0
-    fit[_SPOT, 0], fit[_SPOT, 1] = spot_u, spot_v
+    fit[0], fit[1] = found[0] + middle_u, found[1] + middle_v
+    fit[2], fit[3], fit[4], fit[5] = found[2], found[3], found[3], found[4]
+    fit[_MISFIT], fit[_SPOT_U], fit[_SPOT_V] = found[5], spot_u, spot_v
     return _FOUND

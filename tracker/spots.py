@@ -20,6 +20,7 @@ _HALF = 1 << FIXED_POINT - 1
 # The table of spots while they grow, by column; a spot that met another one leads to it by its PARENT.
 _PARENT, _BALL, _AREA, _SUM_U, _SUM_V, _LEFT, _TOP, _RIGHT, _BOTTOM, _COLUMNS = range(10)
 _FIRST_CAPACITY = 64
+WIDE_PX = 64  # rows as long as that are worth a first look at many pixels at once
 
 
 @compiled("i8(i8, i8, i8, i8, i8)")
@@ -92,28 +93,70 @@ def _likely(spots: NDArray[np.int64], count: int, most_px: float) -> Array:
     return likely[:kept].copy()
 
 
-@compiled("i8(Array(u1, 3, 'C', readonly=True), i8, i8, i8, Array(i2, 1, 'C', readonly=True), i8, i8, i8[:, ::1])")
+@compiled("i8(Array(i2, 1, 'C', readonly=True))")
+def _shift_for(lowest_spread: NDArray[np.int16]) -> int:
+    """Return how far a value may be shifted so that what is left is less than any spread of a colour: 2, or 0."""
+    for value in range(LEVELS):
+        if value >> 2 >= lowest_spread[value]:
+            return 0
+    return 2
+
+
+@compiled("void(Array(u1, 3, 'C', readonly=True), i8, i8, i8, i8, u1[:, ::1])")
+def _line(image: Image, row: int, left: int, blue_by: int, red_by: int, line: NDArray[np.uint8]) -> None:
+    """Fill in the pixels of a row from `left` on, the colour of the light undone."""
+    line[:] = image[row, left : left + len(line)]
+    if blue_by == UNITY and red_by == UNITY:
+        return
+    blue, red, most = np.uint16(blue_by), np.uint16(red_by), np.uint16(LEVELS - 1)
+    for i in range(len(line)):
+        line[i, 0] = min(most, np.uint16(np.uint16(line[i, 0]) * blue // np.uint16(UNITY)))
+        line[i, 2] = min(most, np.uint16(np.uint16(line[i, 2]) * red // np.uint16(UNITY)))
+
+
+@compiled("void(u1[:, ::1], i8, u1[::1])")
+def _flag(pixels: NDArray[np.uint8], shift: int, flags: NDArray[np.uint8]) -> None:
+    """Flag the pixels of a row that may have a colour.
+
+    The shift is a constant where it can be: then the processor takes many pixels at once.
+    """
+    if shift == 2:
+        line, three = pixels.reshape(3 * len(pixels)), np.uint64(3)
+        for i in range(np.uint64(len(pixels))):  # unsigned all through: a sign or a wider number would stop that
+            at = three * np.uint64(i)
+            blue, green, red = line[at], line[at + np.uint64(1)], line[at + np.uint64(2)]
+            most = blue if blue > green else green
+            most = red if red > most else most
+            least = blue if blue < green else green
+            least = red if red < least else least
+            flags[i] = np.uint8(most - least) > np.uint8(most >> np.uint8(2))
+    else:
+        flags[: len(pixels)] = np.uint8(1)
+
+
+@compiled("i8(u1[:, ::1], i8, Array(i2, 1, 'C', readonly=True), i8, u1[::1], i8[:, ::1])")
 def _coloured(
-    image: Image,
-    row: int,
-    left: int,
-    right: int,
-    lowest_spread: NDArray[np.int16],
-    blue_by: int,
-    red_by: int,
-    pixels: NDArray[np.int64],
-) -> int:
-    """Write column, value, spread and hue of a row's pixels that may have a colour, and return how many they are."""
-    found = 0
-    for column in range(left, right):
-        blue = min(255, image[row, column, 0] * blue_by // UNITY)
-        green, red = image[row, column, 1], min(255, image[row, column, 2] * red_by // UNITY)
-        value = max(blue, green, red)
-        spread = value - min(blue, green, red)
-        if spread >= lowest_spread[value]:
-            pixels[found, 0], pixels[found, 1], pixels[found, 2] = column, value, spread
-            pixels[found, 3] = _hue(blue, green, red, value, spread)
-            found += 1
+    line: NDArray[np.uint8], left: int, lowest_spread: NDArray[np.int16], shift: int,
+    flags: NDArray[np.uint8], pixels: NDArray[np.int64],
+) -> int:  # fmt: skip
+    """Write column, value, spread and hue of a row's pixels that may have a colour, and return how many they are.
+
+    line: the row's pixels (n, 3) from column `left` on.
+    flags: overwritten; a multiple of 8 of them, those beyond the row 0.
+    """
+    _flag(line, shift, flags)
+    found, eights = 0, flags.view(np.uint64)
+    for eight in range(len(eights)):
+        if eights[eight] == 0:
+            continue
+        for i in range(8 * eight, min(len(line), 8 * eight + 8)):
+            blue, green, red = line[i, 0], line[i, 1], line[i, 2]
+            value = max(blue, green, red)
+            spread = value - min(blue, green, red)
+            if spread >= lowest_spread[value]:
+                pixels[found, 0], pixels[found, 1], pixels[found, 2] = left + i, value, spread
+                pixels[found, 3] = _hue(blue, green, red, value, spread)
+                found += 1
     return found
 
 
@@ -206,9 +249,12 @@ def find_spots(
     pixels = np.empty((right - left, 4), np.int64)
     runs = np.empty((2, colours, (right - left) // 2 + 1, 3), np.int64)  # of the row above and of this one
     lengths = np.zeros((2, colours), np.int64)
+    shift = _shift_for(lowest_spread) if right - left >= WIDE_PX else 0
+    line, flags = np.empty((right - left, 3), np.uint8), np.zeros((right - left + 7) // 8 * 8, np.uint8)
     for row in range(top, bottom):
         above, here = (row - 1) & 1, row & 1
-        found = _coloured(image, row, left, right, lowest_spread, blue, red, pixels)
+        _line(image, row, left, blue, red, line)
+        found = _coloured(line, left, lowest_spread, shift, flags, pixels)
         for ball in range(colours):
             length = _runs(pixels, found, least_spread[ball], hues[ball], runs[here, ball])
             lengths[here, ball] = length

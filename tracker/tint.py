@@ -21,7 +21,7 @@ from tracker.patch import CLIPPED
 from tracker.types import Array, Image
 
 CORE_SHARE = 0.6  # of the radius: further out the background shines in
-UNITY = 256  # of the fixed point that pixels are multiplied in
+UNITY = 16  # of the fixed point that pixels are multiplied in: a colour's box is far wider than a sixteenth
 LEARN_BALLS = 9  # of each colour, until its own colour is taken as known
 FOLLOW_SHARE = 0.5  # of a newly seen light
 MOST_LOG = 0.7  # a gain beyond exp(0.7), twice, is a mistake
@@ -68,7 +68,8 @@ class Tint:
             seen: ball and mean colour (3,) BGR of its core, from `core_colour`, for each ball well fitted.
         """
         here = math.log(self.gains.blue), math.log(self.gains.red)
-        colours, pull = dict(self.colours), np.zeros(3)
+        colours = dict(self.colours)
+        pull = pull_blue = pull_red = 0.0
         for ball, bgr in seen:
             ratios = _ratios(bgr)
             if ratios is None:
@@ -79,11 +80,13 @@ class Tint:
                 own_blue, own_red = blue - here[0], red - here[1]
                 colours[ball] = total + weight, sum_blue + weight * own_blue, sum_red + weight * own_red, count + 1
             else:
-                pull += weight * np.array((1.0, blue - sum_blue / total, red - sum_red / total))
-        if pull[0] == 0.0:
+                pull += weight
+                pull_blue += weight * (blue - sum_blue / total)
+                pull_red += weight * (red - sum_red / total)
+        if pull == 0.0:
             return Tint(self.gains, colours)
-        steps = (at + FOLLOW_SHARE * (float(p / pull[0]) - at) for at, p in zip(here, pull[1:], strict=True))
-        return Tint(Gains(*(math.exp(max(-MOST_LOG, min(MOST_LOG, step))) for step in steps)), colours)
+        now = _followed(here[0], pull_blue / pull), _followed(here[1], pull_red / pull)
+        return Tint(Gains(math.exp(now[0]), math.exp(now[1])), colours)
 
     def other(self, number: int) -> Gains:
         """Return a light near the known one, to look for balls under when none are found.
@@ -92,6 +95,11 @@ class Tint:
         """
         blue, red = AROUND[number % len(AROUND)]
         return Gains(self.gains.blue * math.exp(blue * GAIN_STEP), self.gains.red * math.exp(red * GAIN_STEP))
+
+
+def _followed(here: float, seen: float) -> float:
+    """Return the logarithm of a gain, moved from where it was towards what was seen."""
+    return max(-MOST_LOG, min(MOST_LOG, here + FOLLOW_SHARE * (seen - here)))
 
 
 def _ratios(bgr: Array) -> tuple[float, float, float] | None:

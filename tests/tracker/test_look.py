@@ -10,6 +10,7 @@ import pytest
 from tests.tracker.drawing import frame
 from tests.tracker.paper_rig import paper_rig
 from tests.tracker.rigs import covariance, perturbed, seen_px, state
+from tracker.album import Album
 from tracker.appearance import Appearance
 from tracker.look import look_everywhere, look_near
 from tracker.patch import Response
@@ -22,7 +23,7 @@ SHARP = [Appearance(Response(0.25, 0.25, detail=1.0))] * 2
 
 
 def look(image: Frame, expected: State) -> tuple[list[BallSighting], list[Rejected]]:
-    found = look_near([image], RIG, expected, SHARP)
+    found = look_near([image], RIG, expected, SHARP, [Album(camera) for camera in RIG.cameras])
     return [fitted.sighting for fitted in found.fitted], list(found.rejections)
 
 

@@ -1,4 +1,4 @@
-"""Simulated frames kept in memory, and played to and fro for as long as a measurement wants."""
+"""Simulated frames kept in memory, and played for as long as a measurement wants."""
 
 from __future__ import annotations
 
@@ -20,10 +20,12 @@ PERIOD_NS = round(1e9 / RATE_HZ)
 class Footage:
     """A short flight, rendered once.
 
+    name: of the path.  closed: whether it ends, after so many instants, as it began, speed and all.
     rig: what it was rendered with.  pairs: the frames, one tuple an instant.
     """
 
-    def __init__(self, settings: Settings, clocks: Clocks, name: str, instants: int) -> None:
+    def __init__(self, settings: Settings, clocks: Clocks, name: str, instants: int, *, closed: bool = False) -> None:
+        self._closed = closed
         self.rig: Rig = rig_of(settings, None).rig
         self._stopwatch = clocks.stopwatch
         timing = SimTiming(RATE_HZ, instants / RATE_HZ)
@@ -33,8 +35,11 @@ class Footage:
         self.pairs = [tuple(frames[i : i + count]) for i in range(0, len(frames), count)]
 
     def play(self, instants: int) -> Iterator[tuple[Frame, ...]]:
-        """Yield that many instants, forwards and backwards in turn so that nothing jumps, times going on."""
-        there_and_back = cycle(chain(self.pairs, self.pairs[-2:0:-1]))
-        for k, pair in enumerate(islice(there_and_back, instants)):
+        """Yield that many instants, times going on.
+
+        A closed path is flown round and round. Another is flown to and fro: its places do not jump, its speed does.
+        """
+        once = self.pairs if self._closed else chain(self.pairs, self.pairs[-2:0:-1])
+        for k, pair in enumerate(islice(cycle(once), instants)):
             t_ns = START_NS + k * PERIOD_NS
             yield tuple(replace(frame, t_ns=t_ns, available_ns=self._stopwatch()) for frame in pair)
