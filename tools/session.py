@@ -132,13 +132,20 @@ def recorder_of(
     return Recorder(
         path,
         attachments={"config.json": json.dumps(settings.model_dump(mode="json"), indent=2).encode()},
-        metadata={"run": about, "versions": versions},
+        metadata={"run": about, "versions": versions, **_vehicle(settings)},
         cameras=rig.cameras,
         marker=rig.marker,
         wall_clock=clocks.wall,
         tlog=tlog_beside(path),
         **how,
     )
+
+
+def _vehicle(settings: Settings) -> dict[str, dict[str, str]]:
+    """Return the vehicle's sheet as metadata, nothing where the config holds none."""
+    if settings.vehicle is None:
+        return {}
+    return {"vehicle": {key: json.dumps(value) for key, value in settings.vehicle.model_dump(mode="json").items()}}
 
 
 def tlog_beside(log: Path) -> Path | None:
