@@ -15,7 +15,9 @@ from typing import Annotated
 
 import typer
 
+from tools.excite.command import register as register_excite
 from tools.request import Clocks, DemoRequest, ExportFormat, Pace, RunRequest
+from tools.sysid.command import register as register_sysid
 from tracker.errors import OperatorError
 
 EXIT_PATH_NOT_HELD = 1
@@ -30,6 +32,8 @@ ONE_THREAD_EACH = ("OPENCV_FOR_THREADS_NUM", "OPENBLAS_NUM_THREADS", "OMP_NUM_TH
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 bench = typer.Typer(help="Measure accuracy, speed and memory: the figures in docs/benchmarks.md.")
 app.add_typer(bench, name="bench")
+register_sysid(app)
+register_excite(app)
 ConfigOption = Annotated[str, typer.Option(help="A shipped config by name, or a path to a .toml.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")]
 
@@ -158,6 +162,9 @@ def demo(
     seed: Annotated[int, typer.Option(help="Same seed, same flight, same noise.", metavar="N")] = 1,
     out: Annotated[Path, typer.Option(help="Folder for the log and the summary.", metavar="DIR")] = Path("logs/demo"),
     pace: Annotated[Pace, typer.Option(help="real: watch it fly. fast: as fast as it goes.")] = Pace.REAL,
+    excite: Annotated[
+        Path | None, typer.Option(help="Fly this plan of `excite` in place of the mission.", metavar="PLAN.toml")
+    ] = None,
 ) -> None:
     """Fly a simulated helicopter on simulated cameras, closed loop, with nothing attached.
 
@@ -166,6 +173,13 @@ def demo(
     request = DemoRequest(duration_s, seed, out, pace)
 
     _tell_of_compiling()
+    if excite is not None:
+        from tools.excite.fly import fly_plan
+        from tools.excite.plan_file import read_plan
+
+        if not fly_plan(request, read_plan(excite), _clocks()).landed:
+            raise typer.Exit(EXIT_PATH_NOT_HELD)
+        return
     from tools.demo import run_demo
 
     if not run_demo(request, _clocks()).verdict.passed:
