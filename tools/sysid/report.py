@@ -30,7 +30,7 @@ p.lead { color: #555; margin-top: 0; } table { border-collapse: collapse; font-s
 th, td { text-align: left; padding: 0.25em 0.9em 0.25em 0; border-bottom: 1px solid #e6e6e6; vertical-align: baseline; }
 th { font-weight: 600; border-bottom: 2px solid #bbb; }
 td.n, th.n { text-align: right; font-variant-numeric: tabular-nums; }
-td.dim { color: #777; } svg { width: 100%; height: auto; } .warn { color: #b3541e; } .cols { columns: 2; }
+td.dim { color: #777; } svg { width: 100%; height: auto; } .warn { color: #b3541e; }
 @media print { body { margin: 0; max-width: none; } h2 { break-after: avoid; } svg, table { break-inside: avoid; } }
 """
 
@@ -141,7 +141,7 @@ class Report:
             f"<p class=lead>{html.escape(self.log)}: {read.data.duration_s:.1f} s in the air in "
             f"{len(read.data.tracks)} part(s), servos at {read.servo_hz:.0f} Hz by {html.escape(read.clock.name)}, "
             f"{read.vehicle.mass_g:g} g. Sources and equations: docs/sysid.md.</p>",
-            *(f"<p class=warn>{html.escape(line)}.</p>" for line in self.warnings()),
+            *(f"<p class=warn>{html.escape(line[0].upper() + line[1:])}.</p>" for line in self.warnings()),
             "<h2>Parameters</h2>", self._parameters(),
             "<p>The standard error holds chance (Cram&eacute;r-Rao, corrected for coloured residuals) and what is "
             "known to be uncertain besides: the clock, whole microseconds, constant coefficients. The truth lies "
