@@ -21,18 +21,22 @@ class Clock(Protocol):
 
 
 class StreamClock:
-    """Time stands at the newest frame: with `--pace fast` the same input gives the same bytes."""
+    """Time stands at the newest frame: with `--pace fast` the same input gives the same bytes.
 
-    def __init__(self) -> None:
+    delay_ns: how long after its own time a frame is in memory, where the far end's clock goes on meanwhile [ns].
+    """
+
+    def __init__(self, delay_ns: int = 0) -> None:
+        self._delay_ns = delay_ns
         self._now_ns = 0
 
     def now_ns(self) -> int:
-        """Return the newest event's time [ns]."""
+        """Return the time at which the newest event is in memory [ns]."""
         return self._now_ns
 
     def follow(self, event: Frame | Silence) -> None:
         """Move on to the event's time; late frames do not turn the clock back."""
-        self._now_ns = max(self._now_ns, event.t_ns)
+        self._now_ns = max(self._now_ns, event.t_ns + self._delay_ns)
 
 
 class Timed(Protocol):

@@ -21,7 +21,9 @@ class Paced:
     A `Rejected` goes on at once, in its place.
     """
 
-    def __init__(self, events: Iterable[Event], clock: Clock, wait: Wait, stopwatch: Nanoseconds) -> None:
+    def __init__(
+        self, events: Iterable[Event], clock: Clock, wait: Wait, stopwatch: Nanoseconds, delay_ns: int = 0
+    ) -> None:
         """Pace the events.
 
         Args:
@@ -29,7 +31,9 @@ class Paced:
             clock: stream time, going on by itself.
             wait: waits; the iteration ends if it returns True.
             stopwatch: stamps `Frame.available_ns`.
+            delay_ns: how long after its own time an event is in memory [ns].
         """
+        self._delay_ns = delay_ns
         self._events = events
         self._clock = clock
         self._wait = wait
@@ -43,7 +47,7 @@ class Paced:
             if isinstance(event, Rejected):
                 yield event
                 continue
-            if not self._wait_until(event.t_ns):
+            if not self._wait_until(event.t_ns + self._delay_ns):
                 return
             yield replace(event, available_ns=self._stopwatch()) if isinstance(event, Frame) else event
 

@@ -73,12 +73,12 @@ def run_demo(request: DemoRequest, clocks: Clocks, console: Console | None = Non
     console = console or Console(stderr=True)
     surroundings, helicopter = Surroundings(), Helicopter()
     mission = Mission(request.duration_s, surroundings.floor_z_m + helicopter.skid_m)
-    _make_folder(request.out)
+    make_folder(request.out)
     settings = load_settings(DEMO_CONFIG)
     with ExitStack() as stack:
         world = World(mission, START_NS, surroundings, helicopter, request.seed)
         stack.callback(world.close)
-        witness, summary = _fly(request, clocks, settings, world, console)
+        witness, summary = fly(request, clocks, settings, world, console)
         flight = flight_of(
             world.history,
             witness.estimates,
@@ -154,7 +154,7 @@ class _WatchedMonitor(Monitor):
         super().take(event, step, self._witness.heard(sent))
 
 
-def _fly(
+def fly(
     request: DemoRequest, clocks: Clocks, settings: Settings, world: World, console: Console
 ) -> tuple[_Witness, Summary]:
     """Run the loop once around."""
@@ -175,9 +175,10 @@ def _fly(
         telemetry = telemetry_of("demo", settings, rig, monitor, clocks)
         outlets = Outlets(outlet, monitor, recorder, status, telemetry)
         stack.enter_context(steady())
-        clock: Clock = StreamClock() if fast else HostClock(clocks.monotonic, START_NS)
+        delay_ns = world.surroundings.delay_ns
+        clock: Clock = StreamClock(delay_ns) if fast else HostClock(clocks.monotonic, START_NS)
         frames = _until_landed(source, world)
-        events = frames if fast else Paced(frames, clock, clocks.sleep_s, clocks.stopwatch)
+        events = frames if fast else Paced(frames, clock, clocks.sleep_s, clocks.stopwatch, delay_ns)
         try:
             run(events, witness, clock, outlets)
         finally:
@@ -190,10 +191,16 @@ def _fly(
 
 
 def _until_landed(source: SimSource, world: World) -> Iterator[Event]:
-    """Yield the frames until the vehicle has stood for a second after its landing."""
+    """Yield the frames until the vehicle has stood for a second after its landing.
+
+    What the bridge sends for a frame is heard at once: an autopilot that read it at its next round only would answer
+    time sync late, and its clock would be wrong in the log by half a round.
+    """
     landed_ns: int | None = None
     for event in source:
         yield event
+        if isinstance(event, Frame):
+            world.hear(event.t_ns + world.surroundings.delay_ns)
         now_ns = world.history[-1].t_ns
         if world.autopilot.mode is Mode.LANDED:
             landed_ns = now_ns if landed_ns is None else landed_ns
@@ -212,7 +219,7 @@ def _outlet(settings: Settings, world: World, clocks: Clocks) -> Outlet:
     )
 
 
-def _make_folder(out: Path) -> None:
+def make_folder(out: Path) -> None:
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:

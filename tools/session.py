@@ -136,7 +136,7 @@ def recorder_of(
     return Recorder(
         path,
         attachments={"config.json": json.dumps(settings.model_dump(mode="json"), indent=2).encode()},
-        metadata={"run": about, "versions": versions},
+        metadata={"run": about, "versions": versions, **_vehicle(settings)},
         cameras=rig.cameras,
         marker=rig.marker,
         wall_clock=clocks.wall,
@@ -144,6 +144,13 @@ def recorder_of(
         film=film_of(settings),
         **how,
     )
+
+
+def _vehicle(settings: Settings) -> dict[str, dict[str, str]]:
+    """Return the vehicle's sheet as metadata, nothing where the config holds none."""
+    if settings.vehicle is None:
+        return {}
+    return {"vehicle": {key: json.dumps(value) for key, value in settings.vehicle.model_dump(mode="json").items()}}
 
 
 def tlog_beside(log: Path) -> Path | None:

@@ -32,9 +32,10 @@ class Section(BaseModel):
 
 
 class RoomSettings(Section):
-    """How the room lies to north."""
+    """How the room lies to north, and how large the part of it is that the vehicle may use, about the room's origin."""
 
     room_yaw_deg: Annotated[float, Strict(), Field(ge=-360, le=360)]
+    volume_mm: Annotated[tuple[Positive, ...], Field(min_length=3, max_length=3)] = (2000.0, 1000.0, 1500.0)
 
 
 class CameraSettings(Section):
@@ -181,6 +182,38 @@ class LogSettings(Section):
     jpeg_quality: Annotated[int, Strict(), Field(ge=1, le=100)] = 95
 
 
+class ServoSettings(Section):
+    """One servo: its pulse at rest, and how much full stick of each kind adds to it."""
+
+    channel: Annotated[int, Strict(), Field(ge=1, le=16)]
+    trim_us: Positive
+    right_us: Real = 0.0
+    nose_up_us: Real = 0.0
+    nose_right_us: Real = 0.0
+    up_us: Real = 0.0
+
+
+class VehicleSettings(Section):
+    """The vehicle's sheet: mass and geometry, what full sticks give, and which servo does what."""
+
+    name: Name
+    mass_g: Positive
+    rotor: Literal["flybar", "coaxial", "other"]
+    rotor_diameter_mm: Positive
+    centre_of_mass_mm: Triple = (0.0, 0.0, 0.0)
+    max_tilt_deg: Annotated[float, Strict(), Field(gt=0, lt=90)] = 20.0
+    max_speed_m_s: Positive = 1.5
+    full_tilt_deg: Annotated[float, Strict(), Field(gt=0, lt=90)]
+    full_yaw_rate_deg_s: Positive
+    full_climb_m_s2: Positive
+    servos: tuple[ServoSettings, ...] = ()
+
+    @model_validator(mode="after")
+    def _channels_differ(self) -> Self:
+        refuse_twins("servo channel", [str(servo.channel) for servo in self.servos])
+        return self
+
+
 class LinkSettings(Section):
     """One way to an autopilot, and what goes over it at every estimate: the profile's messages unless it names some."""
 
@@ -204,6 +237,7 @@ class Settings(Section):
     origin: OriginSettings | None = None
     monitor: MonitorSettings = MonitorSettings()
     log: LogSettings = LogSettings()
+    vehicle: VehicleSettings | None = None
     links: tuple[LinkSettings, ...] = ()
 
     @model_validator(mode="after")

@@ -9,7 +9,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.clock import HostClock
+from bridge.clock import HostClock, StreamClock
 from bridge.pace import Paced, first_time_ns
 from tracker.types import Event, Frame, Reason, Rejected, Silence
 
@@ -119,3 +119,17 @@ def test_looking_at_the_start_of_a_stream_loses_nothing() -> None:
     nothing, empty = first_time_ns(events[:1])
     assert nothing is None
     assert list(empty) == events[:1]
+
+
+def test_a_frame_that_takes_its_time_to_memory_comes_that_much_later() -> None:
+    time, delay_ns = Time(), 30_000_000
+    clock = HostClock(time.read, 7)
+    came = [clock.now_ns() for _ in Paced(frames(7, 7 + PERIOD_NS), clock, time.wait, time.read, delay_ns)]
+    assert came == [7 + delay_ns, 7 + PERIOD_NS + delay_ns]
+
+
+def test_stream_time_is_when_the_newest_frame_is_in_memory() -> None:
+    clock = StreamClock(delay_ns=30_000_000)
+    for frame in (Frame(0, PERIOD_NS, IMAGE), Frame(1, 7, IMAGE)):
+        clock.follow(frame)
+    assert clock.now_ns() == PERIOD_NS + 30_000_000

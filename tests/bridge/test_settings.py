@@ -216,6 +216,8 @@ def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
         ("fx_px = 1194.2562584\n", "", "[[rig.cameras]] cam0: fx_px missing; add it"),
         ("room_yaw_deg = 0.0", "", "[room] room_yaw_deg missing; add it"),
         ('name = "cam1"', 'name = "cam0"', "[rig] camera name cam0 comes twice; each must differ"),
+        ("channel = 4", "channel = 3", "[vehicle] servo channel 3 comes twice; each must differ"),
+        ("mass_g = 55.0", "mass_g = 0.0", "[vehicle] mass_g = 0.0 g: must be greater than 0 g"),
         ('name = "green"', 'name = "yellow"', "[marker] ball name yellow comes twice; each must differ"),
         ("hue_deg = 56.0", "", "[[marker.balls]] yellow: colour missing: the tracker tells balls apart by paint; add"),
         (

@@ -64,6 +64,9 @@ def demo(
     seed: Annotated[int, typer.Option(help="Same seed, same flight, same noise.", metavar="N")] = 1,
     out: Annotated[Path, typer.Option(help="Folder for the log and the summary.", metavar="DIR")] = Path("logs/demo"),
     pace: Annotated[Pace, typer.Option(help="real: watch it fly. fast: as fast as it goes.")] = Pace.REAL,
+    excite: Annotated[
+        Path | None, typer.Option(help="Fly this plan of `excite` in place of the mission.", metavar="PLAN.toml")
+    ] = None,
 ) -> None:
     """Fly a simulated helicopter on simulated cameras, closed loop, with nothing attached.
 
@@ -72,6 +75,13 @@ def demo(
     request = DemoRequest(duration_s, seed, out, pace)
 
     tell_of_compiling()
+    if excite is not None:
+        from tools.excite.fly import fly_plan
+        from tools.excite.plan_file import read_plan
+
+        if not fly_plan(request, read_plan(excite), clocks_of(context)).landed:
+            raise typer.Exit(EXIT_PATH_NOT_HELD)
+        return
     from tools.demo import run_demo
 
     if not run_demo(request, clocks_of(context)).verdict.passed:

@@ -97,5 +97,16 @@ class Cascade:
         return _unit((reference.yaw_rate + self._t.yaw_1_s * error + self._sum_yaw) / self._t.full_yaw_rad_s)
 
 
+def added(sticks: PilotSticks, more: PilotSticks) -> PilotSticks:
+    """Return sticks moved by others, as far as they go."""
+    return PilotSticks(
+        _unit(sticks.right + more.right),
+        _unit(sticks.nose_up + more.nose_up),
+        _unit(sticks.nose_right + more.nose_right),
+        _unit(sticks.up + more.up),
+        sticks.motor,
+    )
+
+
 def _unit(value: float) -> float:
     return max(-1.0, min(1.0, value))

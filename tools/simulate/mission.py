@@ -105,10 +105,10 @@ class Mission:
         phase = next((each for each, end in self._ends_s.items() if t_s < end), Phase.DONE)
         yaw = TURN if phase in (Phase.LAND, Phase.DONE) else 0.0
         if phase is Phase.DONE:
-            return _leg(phase, home, self.ground_inW, (0.0, 1.0), 1.0, yaw)
+            return straight(phase, home, self.ground_inW, (0.0, 1.0), 1.0, yaw)
         start, end = self.span_s(phase)
         if phase is Phase.TAKE_OFF:  # the first part is for the rotor to come up to speed
-            return _leg(phase, self.ground_inW, home, (start + 0.25 * (end - start), end), t_s, yaw)
+            return straight(phase, self.ground_inW, home, (start + 0.25 * (end - start), end), t_s, yaw)
         if phase is Phase.SQUARE:
             return self._on_square(start, end, t_s)
         if phase is Phase.TURN:
@@ -116,15 +116,15 @@ class Mission:
             still = np.zeros(3)
             return Reference(phase, home, still, still, TURN * s, TURN * rate)
         if phase is Phase.LAND:
-            return _leg(phase, home, self.ground_inW, (start, end), t_s, yaw)
-        return _leg(phase, home, home, (start, end), t_s, yaw)
+            return straight(phase, home, self.ground_inW, (start, end), t_s, yaw)
+        return straight(phase, home, home, (start, end), t_s, yaw)
 
     def _on_square(self, start_s: float, end_s: float, t_s: float) -> Reference:
         shares = np.concatenate(([0.0], np.cumsum(_LEG_SHARES))) / sum(_LEG_SHARES)
         times = start_s + (end_s - start_s) * shares
         leg = int(np.clip(np.searchsorted(times, t_s, side="right") - 1, 0, len(_LEG_SHARES) - 1))
         ends = (float(times[leg]), float(times[leg + 1]))
-        return _leg(Phase.SQUARE, self.corners_inW[leg], self.corners_inW[leg + 1], ends, t_s, 0.0)
+        return straight(Phase.SQUARE, self.corners_inW[leg], self.corners_inW[leg + 1], ends, t_s, 0.0)
 
 
 def _ease(span_s: tuple[float, float], t_s: float) -> tuple[float, float, float]:
@@ -136,7 +136,7 @@ def _ease(span_s: tuple[float, float], t_s: float) -> tuple[float, float, float]
     return s * s * (3.0 - 2.0 * s), 6.0 * s * (1.0 - s) / length, 6.0 * (1.0 - 2.0 * s) / length**2
 
 
-def _leg(phase: Phase, a: Array, b: Array, span_s: tuple[float, float], t_s: float, yaw: float) -> Reference:
+def straight(phase: Phase, a: Array, b: Array, span_s: tuple[float, float], t_s: float, yaw: float) -> Reference:
     """Return the reference on the straight from a to b."""
     share, rate, change = _ease(span_s, t_s)
     return Reference(phase, a + share * (b - a), rate * (b - a), change * (b - a), yaw, 0.0)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
@@ -15,7 +17,7 @@ from tools.simulate.autopilot.vessel import Autopilot, Mode
 from tools.simulate.control import PilotSticks
 from tools.simulate.course import Course
 from tools.simulate.helicopter import Helicopter, State, Sticks, standing, step
-from tools.simulate.mission import Mission, Phase
+from tools.simulate.mission import Phase, Reference
 from tools.simulate.wind import Wind
 from tracker.sources.paths import Pose
 from tracker.types import Array
@@ -56,20 +58,31 @@ class Moment:
     commanded_yaw: float
 
 
+class Flown(Protocol):
+    """What the vehicle is to fly: `mission.Mission`, or a hover for excitation."""
+
+    ground_inW: Array
+    """Where it stands before (3,) [m]."""
+
+    def reference_at(self, t_s: float) -> Reference:
+        """Return the reference at t_s since arming."""
+
+
 @dataclass(slots=True, eq=False)
 class World:
     """A room in which time goes on only when asked.
 
     `pose_at` simulates on to the time asked for: physics at 400 Hz, the autopilot at 50 Hz. Between two calls whatever
     is sent to the autopilot's port waits there and is heard at its next tick. The seed sets the gusts; the same seed
-    and datagrams give the same flight.
+    and datagrams give the same flight. excitation: see `Autopilot`.
     """
 
-    mission: Mission
+    mission: Flown
     start_ns: int
     surroundings: Surroundings = field(default_factory=Surroundings)
     helicopter: Helicopter = field(default_factory=Helicopter)
     seed: int = 0
+    excitation: Callable[[float], PilotSticks] | None = None
     history: list[Moment] = field(default_factory=list, init=False)
     autopilot: Autopilot = field(init=False)
     _wind: Wind = field(init=False)
@@ -87,6 +100,7 @@ class World:
             lambda t_s: self.mission.reference_at(t_s).turned(R_WtoN, room_yaw),
             {**FOR_VISION, "VISO_DELAY_MS": round(given.delay_ns / 1e6)},
             origin=given.origin,
+            excitation=self.excitation,
         )
         self._imu = Imu(ImuNoise(), np.random.default_rng((self.seed, 2)))
         self._wind = Wind(given.gust_m_s, given.gust_memory_s, STEP_NS / 1e9, np.random.default_rng((self.seed, 1)))
@@ -99,6 +113,10 @@ class World:
         while self._course.now_ns < t_ns:
             self._advance()
         return self._course.pose_at(t_ns)
+
+    def hear(self, now_ns: int) -> None:
+        """Let the autopilot read what has come by now_ns [ns], with no step between."""
+        self.autopilot.hear(now_ns)
 
     def close(self) -> None:
         """Let go of the autopilot's port."""

@@ -19,7 +19,7 @@ from tools.simulate.autopilot.parameters import FOR_VISION, Parameters
 from tools.simulate.autopilot.port import Port
 from tools.simulate.autopilot.reports import GUIDED, LAND, Snapshot, report
 from tools.simulate.autopilot.vision import VisionSensor
-from tools.simulate.control import Cascade, PilotSticks, Tuning
+from tools.simulate.control import Cascade, PilotSticks, Tuning, added
 from tools.simulate.mission import Phase, Reference
 
 VISION_COMPONENT = 197
@@ -53,6 +53,7 @@ class Autopilot:
     origin: one that its ground station gives it as soon as its filter runs; None if others must.
     booted_ns: world time at which it was switched on [ns]. Its clock counts from there; no one tells it the bridge's.
     ports: how many; the first is the bridge's. What comes by one is passed on to the others, as ArduPilot does.
+    excitation: sticks added to its own by the time since arming [s], while it flies its mission.
     """
 
     def __init__(
@@ -64,7 +65,9 @@ class Autopilot:
         booted_ns: int = BOOTED_NS,
         ports: int = 1,
         tuning: Tuning | None = None,
+        excitation: Callable[[float], PilotSticks] | None = None,
     ) -> None:
+        self._excitation = excitation
         self._tuning = tuning or Tuning()
         self._mission = mission
         self._origin = origin
@@ -124,8 +127,8 @@ class Autopilot:
         if self._origin is not None and self.navigation.runs and self.navigation.origin is None:
             self.set_origin(self._origin)
         self._decide()
-        self._tell()
         self._given = self._sticks(increment.dt_s)
+        self._tell()
         return self._given
 
     def _go_along(self) -> None:
@@ -283,7 +286,8 @@ class Autopilot:
             return self._cascade.level(_SINK if lands else 0.0)
         self.mission_s += dt_s
         self._guided.advance(dt_s)
-        return self._cascade.fly(self.reference(), self._state, dt_s)
+        sticks = self._cascade.fly(self.reference(), self._state, dt_s)
+        return sticks if self._excitation is None else added(sticks, self._excitation(self.mission_s))
 
 
 def _severity(text: str) -> int:
