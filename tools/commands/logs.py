@@ -88,3 +88,16 @@ def replay(
     settings = (settings_of(log) if config is None else load_settings(config)).with_frames("off", None)
     settings = settings.with_links(tuple(link)) if link else on_paper(settings)
     run_session(RunRequest(settings, f"log:{log}", out, pace, summary, overwrite, quiet), clocks_of(context))
+
+
+def compare(
+    a: Annotated[Path, typer.Argument(help="The log of one run.", metavar="A")],
+    b: Annotated[Path, typer.Argument(help="The log of another run of the same frames.", metavar="B")],
+    truth: Annotated[Path | None, typer.Option(help="The recording, with its ground truth.", metavar="DIR")] = None,
+    out: Annotated[Path | None, typer.Option(help="Draw the comparison here.", metavar="FILE.png")] = None,
+    json: JsonOption = False,
+) -> None:
+    """Lay two runs beside each other: error, lag, NIS, latency, and whether they sent the same bytes."""
+    from tools.compare.command import run_compare
+
+    run_compare(a, b, truth, out, json)

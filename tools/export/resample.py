@@ -94,12 +94,12 @@ def resample(
     if len(t_ns) == 0 or len(grid_ns) == 0:
         return Resampled(np.full((len(grid_ns), samples.shape[1]), np.nan), np.full(len(grid_ns), ABSENT, np.int8))
     if fine == 1:
-        return _interpolated(t_ns, samples, joined, grid_ns, layout, spacing)
+        return interpolated(t_ns, samples, joined, grid_ns, layout, spacing)
     kernel = _kernel(fine)
     half = len(kernel) // 2
     places = np.arange(-half, (len(grid_ns) - 1) * fine + half + 1)
     fine_ns = grid_ns[0] + np.rint(places * (spacing.step_ns / fine)).astype(np.int64)
-    drawn = _interpolated(t_ns, samples, joined, fine_ns, layout, spacing)
+    drawn = interpolated(t_ns, samples, joined, fine_ns, layout, spacing)
     middle = half + fine * np.arange(len(grid_ns))
     room = np.minimum(_room(drawn, _breaks(t_ns, joined, fine_ns))[middle], half)
     flags = drawn.flags[middle].copy()
@@ -129,7 +129,7 @@ def _kernel(fine: int) -> Array:
     return kernel
 
 
-def _interpolated(
+def interpolated(
     t_ns: Times, samples: Array, joined: NDArray[np.bool_], at_ns: Times, layout: Layout, spacing: Spacing
 ) -> Resampled:
     """Draw straight lines between neighbours, and nothing anywhere else."""
