@@ -12,7 +12,7 @@ from bridge.histogram import Histogram
 from bridge.log.reader import LogReader, OnOffset
 from tools.export.columns import ESTIMATES, RESET_COLUMN, STATES, Group
 from tools.export.resample import ABSENT, FILLED, SHORTENED, Resampled, Spacing, Times, resample
-from tools.export.survey import Key, Sample, Survey, TimeSource, is_possible, names, sample_of
+from tools.export.survey import Key, Sample, Survey, TimeSource, names, sample_of
 from tracker.types import Array
 
 BLOCK_ROWS, LEAST_ROWS, BLOCK_S = 2048, 16, 30.0
@@ -60,7 +60,7 @@ class Stream:
             self.delays.add(sample.arrived_ns - t_ns)
         self._newest_ns = t_ns
         self._times.append(t_ns)
-        self._rows.append(self.group.read(sample.value))
+        self._rows.append(sample.row)
 
     def next_ns(self, after_ns: int) -> int | None:
         """Return the first sample's time from an instant on, None if there is none yet."""
@@ -115,7 +115,7 @@ class Grid:
         hold_ns = max(stream.spacing.reach_ns for stream in self.streams) + LATE_NS
         for record in self._reader.records({key.group for key in by_key}, on_offset):
             sample = sample_of(record)
-            if not is_possible(sample, record.log_ns):
+            if sample is None:
                 continue
             by_key[sample.key].push(sample, self._survey)
             while record.log_ns - hold_ns > self._time_ns(self._next + self._block_rows):

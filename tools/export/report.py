@@ -34,7 +34,7 @@ def report_of(log: Path, rate_hz: float, grid: Grid, surveyed: Survey) -> Report
         "autopilot_clocks": [_autopilot(link, clock) for link, clock in surveyed.clocks.items()],
         "wall_clock": None if surveyed.wall is None else _wall(surveyed.wall),
         "pauses": [{"from_ns": a, "to_ns": b} for a, b in grid.pauses],
-        "impossible_times": surveyed.impossible,
+        "unusable_records": surveyed.unusable,
         "lost": [str(loss) for loss in surveyed.lost],
     }  # fmt: skip
 

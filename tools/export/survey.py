@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from bridge.log import topics
 from bridge.log.losses import Loss
@@ -76,14 +76,14 @@ class Survey:
     """What a log holds.
 
     clocks: of the autopilots, by link.  wall: the wall clock, None for a run that took no account of it (pace fast).
-    impossible: records an hour or more off their time.
+    unusable: records an hour or more off their time, or without what this version reads.
     """
 
     streams: Mapping[Key, StreamSurvey]
     clocks: Mapping[str, AutopilotClock]
     wall: WallClock | None
     lost: tuple[Loss, ...]
-    impossible: int
+    unusable: int
 
     @property
     def first_ns(self) -> int:
@@ -102,16 +102,28 @@ class Sample(NamedTuple):
     key: Key
     own_ns: int
     arrived_ns: int
-    value: Mapping[str, Any]
+    row: list[float]
 
 
-def sample_of(record: Record) -> Sample:
-    """Read a record of a group."""
-    value = record.value
-    if record.topic == ESTIMATES.name:
-        return Sample(Key(record.topic), value["t_ns"], record.log_ns, value)
-    key = Key(record.topic, value["link"], value["system_id"], value["component_id"])
-    return Sample(key, value["autopilot_ns"], value["arrived_ns"], value)
+def sample_of(record: Record) -> Sample | None:
+    """Read a record of a group.
+
+    Returns:
+        None where it lacks what this version reads, or bears a time an hour or more off that of its writing: one such
+        time would stretch the table.
+    """
+    group, value = GROUPS[record.topic], record.value
+    try:
+        if group is ESTIMATES:
+            sample = Sample(Key(record.topic), value["t_ns"], record.log_ns, group.read(value))
+            at_ns = sample.own_ns
+        else:
+            key = Key(record.topic, value["link"], value["system_id"], value["component_id"])
+            sample = Sample(key, value["autopilot_ns"], value["arrived_ns"], group.read(value))
+            at_ns = sample.arrived_ns
+        return sample if abs(at_ns - record.log_ns) <= IMPOSSIBLE_NS else None
+    except (KeyError, IndexError, TypeError, AttributeError):
+        return None
 
 
 def survey(reader: LogReader, on_offset: OnOffset | None = None) -> Survey:
@@ -122,37 +134,32 @@ def survey(reader: LogReader, on_offset: OnOffset | None = None) -> Survey:
     """
     streams: dict[Key, StreamSurvey] = {}
     clocks: dict[str, AutopilotClock] = {}
-    wall, impossible = WallClock(), 0
+    wall, unusable = WallClock(), 0
     for record in reader.records(WANTED, on_offset):
         if record.topic == CLOCK:
             wall.take(record.value)
         elif record.topic == TIMESYNC:
             clocks.setdefault(record.value["link"], AutopilotClock()).take(record.value)
         else:
-            impossible += not _enter(sample_of(record), record.log_ns, streams)
+            sample = sample_of(record)
+            if sample is None:
+                unusable += 1
+            else:
+                _enter(sample, streams)
     if not streams:
         damage = "".join(f"; {loss}" for loss in reader.lost)
         raise OperatorError(f"log {reader.path}: holds no estimate and no message of an autopilot to export{damage}")
     lost = reader.lost
     paced = reader.metadata().get("run", {}).get("pace") != "fast"
-    return Survey(streams, clocks, wall if paced else None, lost, impossible)
+    return Survey(streams, clocks, wall if paced else None, lost, unusable)
 
 
-def is_possible(sample: Sample, log_ns: int) -> bool:
-    """Say whether a sample's time can be that of a record written then: a damaged one would stretch the table."""
-    at_ns = sample.own_ns if sample.key.group == ESTIMATES.name else sample.arrived_ns
-    return abs(at_ns - log_ns) <= IMPOSSIBLE_NS
-
-
-def _enter(sample: Sample, log_ns: int, streams: dict[Key, StreamSurvey]) -> bool:
-    if not is_possible(sample, log_ns):
-        return False
+def _enter(sample: Sample, streams: dict[Key, StreamSurvey]) -> None:
     group = GROUPS[sample.key.group]
     stream = streams.setdefault(sample.key, StreamSurvey(group))
     own_ns = sample.own_ns if sample.own_ns >= 0 else sample.arrived_ns
     at_ns = sample.own_ns if group is ESTIMATES else sample.arrived_ns
-    stream.take(own_ns, at_ns, group.read(sample.value))
-    return True
+    stream.take(own_ns, at_ns, sample.row)
 
 
 def names(surveyed: Survey) -> Iterator[tuple[Key, tuple[str, ...]]]:

@@ -186,7 +186,15 @@ def test_a_time_that_cannot_be_stretches_no_table(tmp_path: Path) -> None:
     lines.append(Line(wild.topic, START_NS + S, wild.value))
     rows, report = table(write(tmp_path / "a.mcap", lines))
     assert len(rows) <= 100
-    assert report["impossible_times"] == 1
+    assert report["unusable_records"] == 1
+
+
+def test_a_record_that_lacks_what_is_read_is_left_out_and_counted(tmp_path: Path) -> None:
+    lines = [*poses(every(PERIOD_NS, 2.0)), *(servo(t_ns, BOOT_NS, t_ns) for t_ns in every(20 * MS, 2.0))]
+    for line in (lines[10], lines[-10]):
+        line.value.pop("nis", line.value.pop("fields", None))
+    _, report = table(write(tmp_path / "a.mcap", lines))
+    assert report["unusable_records"] == 2
 
 
 def test_samples_that_come_twice_or_go_back_are_left_out_and_counted(tmp_path: Path) -> None:
