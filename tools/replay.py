@@ -34,10 +34,13 @@ def settings_of(log: Path) -> Settings:
 
 
 def on_paper(settings: Settings) -> Settings:
-    """Return settings whose links end in this process and sign nothing: a replay must reach no autopilot by itself."""
+    """Return settings whose links end in this process: a replay must reach no autopilot by itself.
+
+    Nothing is signed, and no origin told: with nobody there to answer, an ArduPilot's poses would wait for it for ever.
+    """
     links = tuple(
         LinkSettings.model_construct(uri=f"memory:{link.uri.replace(':', '/')}", messages=link.messages)
         for link in settings.links
     )
     mavlink = settings.mavlink.model_copy(update={"signing_key": ""})
-    return settings.model_copy(update={"links": links, "mavlink": mavlink})
+    return settings.model_copy(update={"links": links, "mavlink": mavlink, "origin": None})

@@ -36,6 +36,9 @@ class ExportFormat(StrEnum):
 
     TUM = "tum"
     CSV = "csv"
+    PARQUET = "parquet"
+    MAT = "mat"
+    TLOG = "tlog"
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import binascii
+import math
 from typing import Any, NamedTuple
 
 import orjson
@@ -78,6 +79,7 @@ def estimate_value(estimate: Estimate, q_BtoW: list[float]) -> Value:
         "nis": float(estimate.nis),
         "nis_dof": estimate.nis_dof,
         "available_ns": estimate.available_ns,
+        "p_3sigma_m": [3.0 * math.sqrt(max(v, 0.0)) for v in estimate.covariance.diagonal()[:3].tolist()],
         "clock_offsets_ms": [1e3 * offset for offset in estimate.clock_offsets_s.tolist()[1:]],
         "clock_sigmas_ms": [1e3 * sigma for sigma in estimate.clock_sigmas_s.tolist()[1:]],
     }

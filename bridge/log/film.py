@@ -14,7 +14,7 @@ from tracker.types import Event, Frame, Rejected, Silence
 
 MEGABYTE = 1_000_000
 FILM_METADATA = "frames"
-WAITING_FRAMES = 32  # a second of two cameras at 15 Hz, some 30 MB
+WAITING_FRAMES = 64  # two seconds of two cameras at 15 Hz, some 60 MB
 _JPEG_START, _PNG_START = b"\xff\xd8", b"\x89PNG"
 
 

@@ -26,6 +26,8 @@ from bridge.log.losses import Loss, Losses
 from tracker.errors import OperatorError
 
 Decoder = Callable[[bytes], Any]
+OnOffset = Callable[[int], None]
+"""Told how far into the file a walk has come [bytes]."""
 _MESSAGES = frozenset({Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK})
 # Whatever the libraries raise on bytes that are not what they claim to be; MemoryError for a length that is noise,
 # RuntimeError from lz4, TypeError for protobuf descriptors that contradict each other.
@@ -64,15 +66,22 @@ class LogReader:
             raise OperatorError(f"log {path}: is no MCAP file; name a log that `run --log` wrote")
 
     @property
+    def path(self) -> Path:
+        """The file's path, as given."""
+        return self._path
+
+    @property
     def lost(self) -> tuple[Loss, ...]:
         """What the last walk through the file could not read; empty for a whole file."""
         return self._losses.all()
 
-    def records(self, topics: Container[str] | None = None) -> Iterator[Record]:
+    def records(self, topics: Container[str] | None = None, on_offset: OnOffset | None = None) -> Iterator[Record]:
         """Yield the messages of some topics, or of all, in the order they were written."""
         self._losses = losses = Losses()
         decoders = _Decoders(losses)
         for framed in self._frames(_MESSAGES, losses):
+            if on_offset is not None:
+                on_offset(framed.offset)
             for record in _unpack(framed, losses):
                 if isinstance(record, Message):
                     yield from decoders.decode(record, topics, framed.offset)

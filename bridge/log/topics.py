@@ -140,6 +140,7 @@ ESTIMATE = json_topic(
     nis=number("normalised innovation squared of the last update"),
     nis_dof=integer("its degrees of freedom, 0 for no update"),
     available_ns=integer("stopwatch reading when the newest frame in it stood in memory [ns]"),
+    p_3sigma_m=numbers("three standard deviations of the position, for plots: x, y, z in the room [m]", 3),
     clock_offsets_ms=numbers("how much later than its stamp each camera but the first saw, by the first's clock [ms]"),
     clock_sigmas_ms=numbers("one sigma of each of these [ms]"),
 )

@@ -14,13 +14,17 @@ import cv2
 import numpy as np
 import pytest
 
+from bridge.log.film import MEGABYTE, FilmTerms, FrameFormat
+from bridge.log.footage import LogSource
+from bridge.recorder import Recorder
+from tests.bridge.recordings import marker
 from tests.tracker.sources.mjpeg_server import MjpegCamera, decoded, jpegs_of
 from tracker.sources.live import LiveSource
 from tracker.sources.live_camera import LiveCamera
 from tracker.sources.protocol import Source, Stopwatch
 from tracker.sources.recording import RecordingSource
 from tracker.sources.video import VideoSource
-from tracker.types import Event, Frame, Rejected, Silence
+from tracker.types import Event, Frame, Rejected, Silence, Step, TrackState
 
 FRAMES = 12
 PATIENCE = 600  # events: 30 s of silences, for a machine under load
@@ -60,7 +64,27 @@ def live(lab_flight: Path, _: Path, stopwatch: Stopwatch) -> Iterator[Source]:
         yield LiveSource(cameras, lambda: next(monotonic), stopwatch_and_next)
 
 
-MAKERS = (recording, video, live)
+@contextmanager
+def log(lab_flight: Path, scratch: Path, stopwatch: Stopwatch) -> Iterator[Source]:
+    """Read a log that a recording's frames were kept in."""
+    recorded = RecordingSource(lab_flight, lambda: 0)
+    assert recorded.cameras is not None
+    with Recorder(
+        scratch / "a.mcap",
+        attachments={},
+        metadata={},
+        cameras=recorded.cameras,
+        marker=marker(),
+        wall_clock=lambda: 0,
+        block_when_full=True,
+        film=FilmTerms(FrameFormat.PNG, 100 * MEGABYTE),
+    ) as recorder:
+        for event in itertools.islice(recorded, 2 * FRAMES):
+            recorder.take(event, Step(TrackState.SEARCHING), (), event.t_ns)
+    yield LogSource(scratch / "a.mcap", stopwatch)
+
+
+MAKERS = (recording, video, live, log)
 
 
 @pytest.fixture(params=MAKERS, ids=lambda maker: maker.__name__)

@@ -75,6 +75,18 @@ def test_other_settings_give_other_poses_of_the_same_instants(recording: Path, t
     assert any(poses[0][t_ns] != poses[1][t_ns] for t_ns in shared)
 
 
+@pytest.mark.parametrize("profile", ["ardupilot", "px4"])
+def test_a_replay_sends_an_autopilots_own_messages_though_none_is_there(
+    recording: Path, tmp_path: Path, profile: str
+) -> None:
+    flown = fly(f"recording:{recording}", tmp_path / "a.mcap", settings())
+    lab = settings_of(flown)
+    named = lab.model_copy(update={"mavlink": lab.mavlink.model_copy(update={"profile": profile})})
+    again = fly(f"log:{flown}", tmp_path / "b.mcap", on_paper(named))
+    message = {"ardupilot": "VISION_SPEED_ESTIMATE", "px4": "ODOMETRY"}[profile]
+    assert sum(topic.endswith(message) for topic, _, _ in sent(again)) >= 2 * (PAIRS - 2)
+
+
 def test_a_replay_of_a_cut_log_flies_what_is_there(recording: Path, tmp_path: Path) -> None:
     flown = fly(f"recording:{recording}", tmp_path / "a.mcap", settings())
     before = sent(flown)

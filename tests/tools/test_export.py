@@ -17,12 +17,20 @@ from hypothesis import strategies as st
 
 from tests.bridge.estimates import estimate, step
 from tests.bridge.recordings import record, turns
-from tools.export import CSV_COLUMNS, export
+from tools.export.export import Exported, ExportTerms
+from tools.export.export import export as export_by
+from tools.export.lines import CSV_COLUMNS
 from tracker import so3
 from tracker.errors import OperatorError
 from tracker.types import Silence, frozen_array
 
 ROOT = Path(__file__).parents[2]
+
+
+def export(log: Path, format: str, out: Path) -> Exported:
+    """Export each estimate at its own time."""
+    return export_by(log, ExportTerms(format), out)
+
 
 finite = st.floats(-1e6, 1e6, allow_nan=False)
 vectors = st.tuples(finite, finite, finite)
@@ -91,7 +99,7 @@ def test_a_log_cut_short_gives_what_is_there_and_says_what_is_missing(log: Path,
 
 
 def test_an_unknown_format_names_the_known_ones(log: Path, tmp_path: Path) -> None:
-    with pytest.raises(OperatorError, match="unknown format 'bag'; known are csv, tum"):
+    with pytest.raises(OperatorError, match="unknown format 'bag'; known are csv, mat, parquet, tlog, tum"):
         export(log, "bag", tmp_path / "a.bag")
 
 
@@ -120,9 +128,9 @@ def test_a_full_disk_is_told_in_one_line(log: Path, full_disk: Path) -> None:
 def test_a_disk_that_fills_up_while_writing_leaves_no_half_export(log: Path, tmp_path: Path) -> None:
     before = set(tmp_path.iterdir())
     script = (
-        "import resource, sys; from pathlib import Path; from tools.export import export\n"
+        "import resource, sys; from pathlib import Path; from tools.export.export import ExportTerms, export\n"
         "resource.setrlimit(resource.RLIMIT_FSIZE, (9000, 9000))\n"
-        "export(Path(sys.argv[1]), 'csv', Path(sys.argv[2]))"
+        "export(Path(sys.argv[1]), ExportTerms('csv'), Path(sys.argv[2]))"
     )
     command = [sys.executable, "-c", script, str(log), str(tmp_path / "a.csv")]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)

@@ -14,6 +14,7 @@ from bridge.settings import Settings
 from bridge.summary import to_text
 from tools.bench.accuracy import Accuracy, Limit, measure_accuracy
 from tools.bench.consistency import Average, measure_consistency
+from tools.bench.export import measure_export
 from tools.bench.memory import measure_memory
 from tools.bench.rooms import measure_rooms
 from tools.bench.speed import Speed, measure_speed
@@ -96,6 +97,21 @@ def bench_memory(pairs: int, settings: Settings, clocks: Clocks, as_json: bool) 
     console = Console()
     console.print(table)
     console.print(f"peak {result.peak_mb:.1f} MB, frames in memory included; log {result.log_mb:.1f} MB")
+
+
+def bench_export(hours: float, rate_hz: float, format: str, cpu: CpuClocks, as_json: bool) -> None:
+    """Export a long log and watch the process's size."""
+    result = measure_export(hours, rate_hz, format, cpu)
+    if as_json:
+        _print_json(dataclasses.asdict(result))
+        return
+    console = Console()
+    console.print(f"{result.hours:g} h of log, {result.log_mb:.0f} MB, written in {result.write_cpu_s:.1f} s of CPU")
+    console.print(f"{result.rows} rows of {result.format} in {result.export_cpu_s:.1f} s of CPU")
+    quarters = ", ".join(f"{mb:.0f}" for mb in result.grown_by_quarter_mb)
+    console.print(
+        f"memory grew by {result.grown_mb:.0f} MB at most; at a quarter, half, three quarters by {quarters} MB"
+    )
 
 
 def bench_consistency(seeds: int, gamma: float, as_json: bool) -> None:

@@ -46,7 +46,7 @@ def measure_memory(settings: Settings, clocks: Clocks, pairs: int) -> Memory:
         for k, pair in enumerate(footage.play(pairs)):
             yield from pair
             if (k + 1) % every == 0:
-                resident[k + 1] = _status_mb("VmRSS")
+                resident[k + 1] = status_mb("VmRSS")
 
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "bench.mcap"
@@ -57,10 +57,10 @@ def measure_memory(settings: Settings, clocks: Clocks, pairs: int) -> Memory:
             run(events(), tracker_of(settings, footage.rig, clocks), clock, outlets)
         finally:
             close(clock, outlets)
-        return Memory(resident, _status_mb("VmHWM"), log.stat().st_size / 1e6)
+        return Memory(resident, status_mb("VmHWM"), log.stat().st_size / 1e6)
 
 
-def _status_mb(name: str) -> float:
+def status_mb(name: str) -> float:
     """Return a line of the kernel's account of this process [MB]."""
     for line in STATUS.read_text(encoding="ascii").splitlines():
         if line.startswith(f"{name}:"):

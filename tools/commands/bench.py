@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from tools.commands.common import ConfigOption, JsonOption, clocks_of, cpu_clocks_of, tell_of_compiling
+from tools.request import ExportFormat
 
 bench = typer.Typer(help="Measure accuracy, speed and memory: the figures in docs/benchmarks.md.")
 
@@ -55,6 +56,22 @@ def memory(
     from tools.bench.commands import bench_memory
 
     bench_memory(pairs, load_settings(config), clocks_of(context), json)
+
+
+@bench.command()
+def export(
+    context: typer.Context,
+    hours: Annotated[float, typer.Option(help="Length of the log.", min=0.01)] = 8.0,
+    rate_hz: Annotated[
+        float, typer.Option("--rate_hz", "--rate-hz", help="Rows a second.", min=0.1, max=2000.0)
+    ] = 50.0,
+    format_: Annotated[ExportFormat, typer.Option("--format", help="As for export.")] = ExportFormat.PARQUET,
+    json: JsonOption = False,
+) -> None:
+    """Write a long log, export it at a fixed rate, and watch time and memory."""
+    from tools.bench.commands import bench_export
+
+    bench_export(hours, rate_hz, format_.value, cpu_clocks_of(context), json)
 
 
 @bench.command()

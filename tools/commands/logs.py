@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import sys
-import tempfile
 from pathlib import Path
 from typing import Annotated
 
@@ -11,8 +9,6 @@ import typer
 
 from tools.commands.common import JsonOption, clocks_of, tell_of_compiling
 from tools.request import ExportFormat, Pace, RunRequest
-
-STDOUT = Path("-")
 
 
 def monitor(
@@ -34,26 +30,37 @@ def monitor(
 
 def export(
     log: Annotated[Path, typer.Argument(help="A log that `run` or `demo` wrote.")],
-    format_: Annotated[ExportFormat, typer.Option("--format", help="tum: time and pose. csv: every column.")],
+    format_: Annotated[
+        ExportFormat,
+        typer.Option("--format", help="tum: time and pose. csv, parquet, mat: every column. tlog: MAVLink as it went."),
+    ],
     out: Annotated[
         Path | None, typer.Option(help="File to write, - for stdout; else beside the log.", metavar="FILE")
     ] = None,
+    rate_hz: Annotated[
+        float | None,
+        typer.Option(
+            "--rate_hz",
+            "--rate-hz",
+            metavar="R",
+            help="Estimates and the autopilot's messages at a fixed rate on one clock, with an alignment report.",
+        ),
+    ] = None,
+    gap_ms: Annotated[
+        float | None,
+        typer.Option(
+            "--gap_ms",
+            "--gap-ms",
+            metavar="MS",
+            help="Leave longer gaps empty; else those of three samples in a stream's own rhythm.",
+        ),
+    ] = None,
 ) -> None:
-    """Write a log's estimates as a table."""
-    from tools.export import export as write_table
+    """Write a log as a file that other programs read."""
+    from tools.export.command import run_export
+    from tools.export.export import ExportTerms
 
-    if out == STDOUT:
-        with tempfile.TemporaryDirectory() as folder:
-            table = Path(folder) / "table"
-            report = write_table(log, format_, table)
-            sys.stdout.write(table.read_text(encoding="utf-8"))
-            sys.stdout.flush()  # here, so that a reader who left, as `head` does, is noticed in time
-    else:
-        out = out or log.with_suffix(f".{format_}")
-        report = write_table(log, format_, out)
-        typer.echo(f"{report.count} estimates written to {out}", err=True)
-    for loss in report.lost:
-        typer.echo(f"posebridge: warning: {log}: {loss}", err=True)
+    run_export(log, ExportTerms(format_.value, rate_hz, gap_ms), out)
 
 
 def replay(
@@ -81,3 +88,16 @@ def replay(
     settings = (settings_of(log) if config is None else load_settings(config)).with_frames("off", None)
     settings = settings.with_links(tuple(link)) if link else on_paper(settings)
     run_session(RunRequest(settings, f"log:{log}", out, pace, summary, overwrite, quiet), clocks_of(context))
+
+
+def compare(
+    a: Annotated[Path, typer.Argument(help="The log of one run.", metavar="A")],
+    b: Annotated[Path, typer.Argument(help="The log of another run of the same frames.", metavar="B")],
+    truth: Annotated[Path | None, typer.Option(help="The recording, with its ground truth.", metavar="DIR")] = None,
+    out: Annotated[Path | None, typer.Option(help="Draw the comparison here.", metavar="FILE.png")] = None,
+    json: JsonOption = False,
+) -> None:
+    """Lay two runs beside each other: error, lag, NIS, latency, and whether they sent the same bytes."""
+    from tools.compare.command import run_compare
+
+    run_compare(a, b, truth, out, json)
