@@ -46,6 +46,10 @@ class Appearance:
             return self
         return replace(self, response=replace(self.response, gamma=gamma), light=self.light.faded())
 
+    def relit(self) -> Appearance:
+        """Return it with its light all but forgotten; balls are drawn by the old one until a new one is known."""
+        return replace(self, light=replace(self.light.faded(), count=0))
+
     def expected_like(self, ball: Expected, camera: Camera, uv_px: Array) -> Expected:
         """Return what would be expected of a ball, seen at uv_px (2,), if it looked as is known here."""
         x, y, z = camera.bearings(uv_px[None])[0].tolist()

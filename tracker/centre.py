@@ -30,6 +30,8 @@ ROUGH_PX = 0.5
 CONVERGED_PX = 0.02  # of the last step; what is left after it is far smaller
 MAX_SHIFT_PX = 1.5
 RIDGE = 1.0 + 1e-9
+COVERED = 0.5  # share of a pixel that makes it the ball's
+STRAIN_OUT, STRAIN_IN, STANDS_OUT, _SUMS = 5, 6, 7, 8
 
 
 class Group(Enum):
@@ -44,11 +46,15 @@ class Centre:
     """A fitted ball.
 
     uv_px (2,), cov_px (2, 2) [px^2] of the fit alone; misfit: chi2 per degree of freedom.
+    strain_in, strain_out: square of the colour that the model leaves on the ball and beside it, all pixels counted
+        alike, clipped ones too, as a share of the square by which the ball stands out.
     """
 
     uv_px: Array
     cov_px: Array
     misfit: float
+    strain_in: float = 0.0
+    strain_out: float = 0.0
 
 
 @compiled("void(f8[:, ::1], Array(float32, 3, 'C', True), i8, f8, f8, i8[:, ::1], i8, i8, f8[:, ::1])")
@@ -132,7 +138,8 @@ def _add_channel(
     Args:
         by_u, by_v (p, n): slopes of the shapes.  factor, c (m,): from `_fit_linear`.
         squares (n,): misfit of each pixel, added to.
-        normal (5,): information uu, uv, vv and gradient u, v of the centre, added to.
+        normal (8,): information uu, uv, vv and gradient u, v of the centre; squares left beside the ball and on it,
+            squares by which the ball stands out; added to.
     """
     m, n = model.shape
     rest, slope_u, slope_v = pixels[LUMA + channel].copy(), np.empty(n), np.empty(n)
@@ -142,6 +149,12 @@ def _add_channel(
     weighted_u, weighted_v = weight * slope_u, weight * slope_v
     for i in range(n):
         squares[i] += (pixels[TRUST, i] * rest[i]) ** 2
+        if model[0, i] > COVERED:
+            plane = c[m - 3] + c[m - 2] * pixels[X, i] + c[m - 1] * pixels[Y, i]
+            normal[STRAIN_IN] += rest[i] ** 2
+            normal[STANDS_OUT] += (pixels[LUMA + channel, i] - plane) ** 2
+        else:
+            normal[STRAIN_OUT] += rest[i] ** 2
     normal[0] += dot(weighted_u, slope_u)
     normal[1] += dot(weighted_u, slope_v)
     normal[2] += dot(weighted_v, slope_v)
@@ -162,7 +175,7 @@ def _add_channel(
 def _linearise(pixels: Array, drawn: Array, tukey: Array, squares: Array, normal: Array) -> None:
     """Linearise the brightness or the colour of a patch about the centre that a ball was drawn at, see `_draw_at`.
 
-    Fills in squares (n,) and normal (5,) as `_add_channel` does.
+    Fills in squares (n,) and normal (8,) as `_add_channel` does.
     """
     count, p, channels = pixels.shape[1], (len(drawn) - PLANE) // 3, len(pixels) - LUMA
     weight = np.empty(count)
@@ -180,7 +193,7 @@ def _linearise(pixels: Array, drawn: Array, tukey: Array, squares: Array, normal
 
 @compiled("f8(f8[::1], f8[::1], i8, i8, f8[::1])")
 def _misfit(squares: Array, tukey: Array, channels: int, shapes: int, normal: Array) -> float:
-    """Return chi2 per degree of freedom of brightness or colour, and weaken normal (5,) where it is above 1."""
+    """Return chi2 per degree of freedom of brightness or colour, and weaken normal (8,) where it is above 1."""
     freedom, total = -float(channels * (shapes + PLANE)), 0.0
     for i in range(len(squares)):
         freedom += channels * tukey[i] ** 2
@@ -264,12 +277,15 @@ def gauss_newton(
     v: float,
     fit: Array,
 ) -> None:
-    """Fit from a start (u, v), pixels from the patch's middle; fill in u, v, covariance uu, uv, vv and misfit."""
+    """Fit from a start (u, v), pixels from the patch's middle.
+
+    Fills in fit (8,): u, v, covariance uu, uv, vv, misfit, and the strains on the ball and beside it.
+    """
     limit = 3 * per_px // 2  # a centre further from the middle pixel has run away
     p, n_bright, n_colour = luma.shape[2], bright.shape[1], colour.shape[1]
     drawn_b, drawn_c = np.empty((3 * p + PLANE, n_bright)), np.empty((3 * p + PLANE, n_colour))
-    tukey_b, squares_b, normal = np.ones(n_bright), np.empty(n_bright), np.empty(5)
-    tukey_c, squares_c, normal_c = np.ones(n_colour), np.empty(n_colour), np.empty(5)
+    tukey_b, squares_b, normal = np.ones(n_bright), np.empty(n_bright), np.empty(_SUMS)
+    tukey_c, squares_c, normal_c = np.ones(n_colour), np.empty(n_colour), np.empty(_SUMS)
     misfit = det = 0.0
     at_u = at_v = limit + 1  # where the ball is drawn: nowhere yet
     for iteration in range(ITERATIONS):
@@ -299,6 +315,8 @@ def gauss_newton(
     fit[0], fit[1] = u, v
     fit[2], fit[3], fit[4] = normal[2] / det, -normal[1] / det, normal[0] / det
     fit[5] = misfit
+    stands_out = max(normal_c[STANDS_OUT], 1e-12)
+    fit[6], fit[7] = normal_c[STRAIN_IN] / stands_out, normal_c[STRAIN_OUT] / stands_out
 
 
 def fit_centre(image: Image, ball: Expected) -> Centre | Reason:
@@ -315,17 +333,17 @@ def fit_centre(image: Image, ball: Expected) -> Centre | Reason:
     extent = extent_of(ball)
     if not fits_in(image, extent):
         return Reason.AT_BORDER
-    patch, streak_px, fit = cut(image, extent, ball.response), ball.streak_px, np.empty(6)
+    patch, streak_px, fit = cut(image, extent, ball.response), ball.streak_px, np.empty(8)
     luma = template_for(ball.radius_px, ball.response.luma_px, ball.shades)
     chroma = template_for(ball.radius_px, ball.response.chroma_px, ball.shades, ball.response.block_px)
     n, places = luma.per_px, places_along(streak_px, luma.per_px)
     shapes = luma.fine, chroma.fine, n, luma.radius_px
     gauss_newton(patch.bright, patch.colour, *shapes, ball.radius_px, places, extent.du, extent.dv, fit)
-    du, dv, cov_uu, cov_uv, cov_vv, misfit = fit.tolist()
+    du, dv, cov_uu, cov_uv, cov_vv, *rest = fit.tolist()
     if not math.hypot(du - extent.du, dv - extent.dv) <= MAX_SHIFT_PX:
         return Reason.NO_BALL
     uv_px = frozen_array((extent.u + du, extent.v + dv))
-    return Centre(uv_px, frozen_array(((cov_uu, cov_uv), (cov_uv, cov_vv))), misfit)
+    return Centre(uv_px, frozen_array(((cov_uu, cov_uv), (cov_uv, cov_vv))), *rest)
 
 
 def misfit_at(patch: Patch, ball: Expected, centre: tuple[float, float], group: Group) -> float:

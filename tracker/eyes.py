@@ -9,6 +9,7 @@ from tracker.look import Fitted, Look, look_near
 from tracker.rig import Rig
 from tracker.rivals import first_rivals
 from tracker.state import State
+from tracker.strain import Strains
 from tracker.types import Frame
 from tracker.view import unknown_streak_px
 
@@ -25,6 +26,7 @@ class Eyes:
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
         self._rivals = [first_rivals() for _ in rig.cameras]
+        self._strains = Strains(len(rig.cameras))
         self._turn = 0
         self._taught_blindly = False
 
@@ -41,6 +43,7 @@ class Eyes:
     def look(self, frames: Sequence[Frame], state: State) -> Look:
         """Find each ball in each image where a state expects it."""
         look = look_near(frames, self._rig, state, [rivals.best for rivals in self._rivals])
+        look = self._strains.doubted(look)
         doubt_px = SMEAR_DOUBT * self._streak_px(state)
         return look.doubted(doubt_px) if doubt_px > SMEAR_DOUBT * BLIND_PX else look
 
@@ -58,6 +61,8 @@ class Eyes:
         blindly: how fast they moved was not known. It is better than nothing, and forgotten if they did move.
         """
         self._turn += 1
+        for changed in self._strains.relit(fitted):
+            self._rivals[changed] = self._rivals[changed].relit()
         if self._taught_blindly and not blindly:
             self._taught_blindly = False
             if any(math.hypot(*one.expected.streak_px) > LONG_STREAK_PX for one in fitted):

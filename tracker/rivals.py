@@ -46,7 +46,8 @@ class Rivals:
     @property
     def lessons_due(self) -> int:
         """Return how often to go over the first images again, since nothing else is known yet."""
-        return FIRST_LESSONS if not self.settled and self.count <= FIRST_BALLS else 0
+        young = not self.settled and self.count <= FIRST_BALLS
+        return FIRST_LESSONS if young or self.best.light.count <= FIRST_BALLS else 0
 
     @property
     def settled(self) -> bool:
@@ -70,6 +71,10 @@ class Rivals:
             misfits.append(misfit + share * (float(np.log(fit.misfit)) - misfit))
         after = Rivals(tuple(appearances), tuple(misfits), self.count + 1, self.step)
         return after._closer() if after.count >= ROUND_BALLS else after
+
+    def relit(self) -> Rivals:
+        """Return the rivals under a light that has become another one, to be learned anew."""
+        return replace(self, appearances=tuple(appearance.relit() for appearance in self.appearances))
 
     def _closer(self) -> Rivals:
         """Return the best with two nearer rivals, or alone when they would be too near to tell apart."""

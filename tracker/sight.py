@@ -21,7 +21,7 @@ from tracker.view import RAY_X
 REGION_SIGMA = 3.5
 REGION_MARGIN_PX = 3.0
 LEAST_AREA_SHARE, MOST_AREA_SHARE = 0.15, 4.0  # of the ball's expected disc
-_UV, _COV, _MISFIT, _SPOT = 0, 1, 3, 4  # rows of what a fit gives
+_UV, _COV, _MISFIT, _SPOT, _STRAIN = 0, 1, 3, 4, 5  # rows of what a fit gives
 _FOUND, _NO_COLOUR, _OUT_OF_VIEW, _CUT_OFF, _RAN_AWAY = range(5)
 _REASONS = {
     _NO_COLOUR: Reason.NO_BALL, _OUT_OF_VIEW: Reason.AT_BORDER, _CUT_OFF: Reason.AT_BORDER, _RAN_AWAY: Reason.NO_BALL,
@@ -55,7 +55,7 @@ def find_ball(
     half = math.ceil(edge_px + MARGIN_PX)
     luma = template_for(radius_px, response.luma_px, shades)
     chroma = template_for(radius_px, response.chroma_px, shades, response.block_px)
-    fit = np.empty((5, 2))
+    fit = np.empty((6, 2))
     status = _find_and_fit(
         image, colour.least_spread, colour.lowest_spread, colour.hues, u, v, S_uu, S_uv, S_vv, radius_px, edge_px, half,
         response.block_px, light_of(response.gamma), trust_of(response.gamma), luma.fine, chroma.fine, luma.per_px,
@@ -66,7 +66,8 @@ def find_ball(
     fit.flags.writeable = False
     spot = float(fit[_SPOT, 0]), float(fit[_SPOT, 1])
     expected = Expected(spot, radius_px, (speed_u, speed_v), shades, response)
-    return Sight(expected, Centre(fit[_UV], fit[_COV : _COV + 2], float(fit[_MISFIT, 0])))
+    misfit, strain_in, strain_out = float(fit[_MISFIT, 0]), float(fit[_STRAIN, 0]), float(fit[_STRAIN, 1])
+    return Sight(expected, Centre(fit[_UV], fit[_COV : _COV + 2], misfit, strain_in, strain_out))
 
 
 @compiled(
@@ -82,8 +83,8 @@ def _find_and_fit(
 ) -> int:  # fmt: skip
     """Find the spot nearest the prediction, cut its pixels out and fit them.
 
-    Fills in fit (5, 2): centre, its covariance (2, 2), misfit (with nothing beside it), the spot's middle; returns how
-    it went.
+    Fills in fit (6, 2): centre, its covariance (2, 2), misfit (with nothing beside it), the spot's middle, the strains;
+    returns how it went.
     """
     height, width = image.shape[0], image.shape[1]
     half_u = REGION_SIGMA * np.sqrt(S_uu) + radius_px + REGION_MARGIN_PX
@@ -106,7 +107,7 @@ def _find_and_fit(
     middle_u, middle_v = round(spot_u), round(spot_v)
     if not (half <= middle_u < width - half and half <= middle_v < height - half):
         return _CUT_OFF
-    du, dv, found = spot_u - middle_u, spot_v - middle_v, np.empty(6)
+    du, dv, found = spot_u - middle_u, spot_v - middle_v, np.empty(8)
     bright, colour = cut_pixels(image, middle_u, middle_v, half, block, du, dv, edge_px, light, trust)
     gauss_newton(bright, colour, luma, chroma, per_px, drawn_px, radius_px, places, du, dv, found)
     if not (found[0] - du) ** 2 + (found[1] - dv) ** 2 <= MAX_SHIFT_PX**2:
@@ -115,4 +116,5 @@ def _find_and_fit(
     fit[_COV, 0], fit[_COV, 1], fit[_COV + 1, 0], fit[_COV + 1, 1] = found[2], found[3], found[3], found[4]
     fit[_MISFIT, 0], fit[_MISFIT, 1] = found[5], 0.0
     fit[_SPOT, 0], fit[_SPOT, 1] = spot_u, spot_v
+    fit[_STRAIN, 0], fit[_STRAIN, 1] = found[6], found[7]
     return _FOUND
