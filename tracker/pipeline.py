@@ -9,19 +9,17 @@ It reads no clock but the stopwatch it is given, and touches no file and no devi
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 
-import numpy as np
-
-from tracker import so3
 from tracker.acquire import Seen, first_state
 from tracker.bias import shared_covariance
+from tracker.cadence import Cadence
+from tracker.continuity import Continuity
 from tracker.detect import Blob
 from tracker.ekf import Update, update
 from tracker.eyes import Eyes
-from tracker.gate import chi2_limit
 from tracker.history import History
 from tracker.intake import Intake
 from tracker.look import Look, look_everywhere
@@ -38,13 +36,14 @@ from tracker.types import (
     Frame,
     Reason,
     Rejected,
+    Silence,
     Step,
     TrackState,
     frozen_array,
 )
 
-RESETS = 256
-UNBROKEN_S, LEAST_GAP_S = 0.1, 0.033
+ALONE_NS = 100_000_000  # one ball tells a place and no attitude: longer than this it carries no track
+NO_BREAKS: Mapping[int, float] = MappingProxyType({})
 
 Round = tuple[Frame, ...]
 
@@ -85,7 +84,9 @@ class Tracker:
         self._whole: dict[int, tuple[Frame, list[list[Blob]]]] = {}
         self._track = TrackState.SEARCHING
         self._lights_tried = 0
-        self._resets = 0
+        self._continuity = Continuity(tuning)
+        self._cadence = Cadence(len(rig.cameras))
+        self._seen_ns = [-(2**63)] * len(rig.marker)
         self._sent_ns = -(2**63)
 
     def step(self, event: Event) -> Step:
@@ -94,6 +95,8 @@ class Tracker:
         if isinstance(event, Frame) and 0 <= event.camera < len(self._rig.cameras):
             offset_ns = self._rig.cameras[event.camera].clock_offset_ns
             event = replace(event, t_ns=event.t_ns + offset_ns) if offset_ns else event
+        if isinstance(event, Silence):
+            self._intake.wait(event.t_ns)
         if isinstance(event, Rejected):
             harvest.rejections.append(event)
         else:
@@ -126,6 +129,8 @@ class Tracker:
             return
         before = self._history.newest
         found = self._follow(frames, t_ns, harvest) if self._track is TrackState.TRACKING else None
+        if found is not None and self._carried_by_one(found):
+            found, self._track = None, TrackState.LOST
         if before is None or t_ns >= before.t_ns:
             few = found is None or 2 * len(found.used) < len(frames) * len(self._rig.marker)
             # The few balls where the track expects them may be something else: look whether the marker is elsewhere.
@@ -135,12 +140,13 @@ class Tracker:
         available_ns = max(frame.available_ns for frame in frames)
         stages = harvest.stages(started_ns - available_ns, self._stopwatch() - started_ns)
         self._sent_ns = found.state.t_ns
+        self._continuity.went_out(found.state)
         harvest.estimates.append(self._estimate(found, available_ns, stages))
 
     def _follow(self, frames: Round, t_ns: int, harvest: _Harvest) -> Update | None:
         """Update the track with a round; a late one is put in where it belongs and what came after is done again."""
         later = self._history.back_to(t_ns)
-        result = self._study(frames, self._ahead(t_ns), harvest)
+        result = self._study(frames, self._ahead(t_ns, self._cadence.breaks(frames)), harvest)
         if result is not None:
             self._history.remember(result)
         for past in later:
@@ -150,12 +156,15 @@ class Tracker:
                 result = again
         return result
 
-    def _ahead(self, t_ns: int) -> Prediction:
-        """Return the newest state carried on to an instant; there is one while tracking."""
+    def _ahead(self, t_ns: int, clock_breaks: Mapping[int, float] = NO_BREAKS) -> Prediction:
+        """Return the newest state carried on to an instant; there is one while tracking.
+
+        clock_breaks: by camera, how far its clock may have jumped meanwhile [s].
+        """
         newest = self._history.newest
         if newest is None:
             raise ValueError("nothing is tracked yet")
-        return predict(newest, t_ns, self._tuning.process)
+        return predict(newest.with_clocks_open(clock_breaks) if clock_breaks else newest, t_ns, self._tuning.process)
 
     def _see(self, frames: Round, ahead: Prediction, harvest: _Harvest, *, start: bool = False) -> Update | None:
         """Look where a predicted state expects the balls and update it, or return None.
@@ -218,9 +227,11 @@ class Tracker:
             found = self._search_in_other_light(fresh)
         if found is None:
             return None
-        before = self._history.newest
-        if before is not None and self._jumped(before, found.state):
-            self._resets = (self._resets + 1) % RESETS
+        if not self._continuity.believes(found.state):
+            detail = "the marker has turned in place as no vehicle does: colours swapped"
+            harvest.rejections.append(Rejected(Reason.GEOMETRY, detail, t_ns))
+            self._eyes.suppose(gains)
+            return None
         self._whole.clear()
         self._history.restart(found)
         self._track = TrackState.TRACKING
@@ -249,6 +260,13 @@ class Tracker:
         guess = first_guess(self._still_known(start), self._tuning.process)
         return self._study(tuple(frame for frame, _ in seen.values()), guess, harvest, start=True)
 
+    def _carried_by_one(self, found: Update) -> bool:
+        """Say whether for a while no more than one ball was seen: what seems another is then soon a mistake."""
+        for sighting in found.used:
+            self._seen_ns[sighting.ball] = max(self._seen_ns[sighting.ball], sighting.t_ns)
+        newest_ns = max(self._seen_ns)
+        return sum(newest_ns - seen_ns <= ALONE_NS for seen_ns in self._seen_ns) < 2
+
     def _all_seen_twice(self, found: Update) -> bool:
         """Say whether a start is borne out by every ball in two cameras: less fits many places."""
         cameras = [{s.camera for s in found.used if s.ball == ball} for ball in range(len(self._rig.marker))]
@@ -262,22 +280,6 @@ class Tracker:
         P = start.P.copy()
         P[OFFSETS:, OFFSETS:] = last.P[OFFSETS:, OFFSETS:]
         return replace(start, P=P, offsets_s=last.offsets_s, noise=last.noise)
-
-    def _jumped(self, before: State, found: State) -> bool:
-        """Say whether a pose found again is none that the old track can have led to."""
-        if not 0 <= found.t_ns - before.t_ns <= self._tuning.continuity_limit_ns:
-            return True
-        process, gap_s = self._tuning.process, (found.t_ns - before.t_ns) * 1e-9
-        if gap_s <= UNBROKEN_S:  # never out of sight: a brisk turn is no jump as long as a vehicle can fly it
-            reach_s = max(gap_s, LEAST_GAP_S)
-            step_m = float(np.linalg.norm(found.p_BinW - before.p_BinW))
-            turn = float(np.linalg.norm(so3.log(before.R_BtoW.T @ found.R_BtoW)))
-            if step_m <= process.initial_speed_m_s * reach_s and turn <= 3.0 * process.initial_rate_rad_s * reach_s:
-                return False
-        ahead = predict(before, found.t_ns, process).state
-        error = np.concatenate((found.p_BinW - ahead.p_BinW, so3.log(ahead.R_BtoW.T @ found.R_BtoW)))
-        distance2 = float(error @ np.linalg.solve((ahead.P + found.P)[:6, :6], error))
-        return distance2 > chi2_limit(self._tuning.gate_probability, 6)
 
     def _watch_the_time(self, t_ns: int) -> None:
         """Lose the track when nothing of it was seen for too long."""
@@ -299,7 +301,7 @@ class Tracker:
             clock_offsets_s=frozen_array(state.offsets_s),
             clock_sigmas_s=frozen_array([0.0, *(math.sqrt(v) for v in state.P.diagonal()[OFFSETS:].tolist())]),
             state=self._track,
-            reset_counter=self._resets,
+            reset_counter=self._continuity.resets,
             nis=found.nis,
             nis_dof=found.dof,
             available_ns=available_ns,
