@@ -8,12 +8,13 @@ from itertools import chain, islice
 from pathlib import Path
 
 from bridge.clock import StreamClock
+from bridge.dialect import Encoder, Identity
 from bridge.dialogue import Terms
 from bridge.histogram import Histogram
 from bridge.links import open_link
 from bridge.monitor import Monitor
 from bridge.outlet import DEFAULT_SYSTEM_ID, Outlet, Spout
-from bridge.pack import MESSAGES, Encoder, Identity, Packer
+from bridge.pack import MESSAGES, Packer
 from bridge.run import Outlets, close, run
 from bridge.settings import Settings
 from bridge.summary import Percentiles, Summary
