@@ -30,7 +30,7 @@ def painted_over(frame: Frame, rig: Rig, ball: int, truth: GroundTruth) -> Frame
     uv_px = rig.cameras[frame.camera].project(ball_inW[None])[0][0]
     mask = np.zeros(frame.image.shape[:2], np.uint8)
     cv2.circle(mask, (round(uv_px[0]), round(uv_px[1])), AROUND_PX, 255, cv2.FILLED)
-    image = cv2.inpaint(frame.image, mask, 3.0, cv2.INPAINT_TELEA)
+    image = np.asarray(cv2.inpaint(frame.image, mask, 3.0, cv2.INPAINT_TELEA), np.uint8)
     image.flags.writeable = False
     return replace(frame, image=image)
 
