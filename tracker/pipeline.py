@@ -26,6 +26,7 @@ from tracker.look import Look, look_everywhere
 from tracker.predict import Prediction, first_guess, predict
 from tracker.rig import Rig
 from tracker.rounds import Rounds
+from tracker.sag import sag_covariance
 from tracker.state import OFFSETS, REPORTED, State
 from tracker.tint import Gains
 from tracker.tuning import Tuning
@@ -290,7 +291,7 @@ class Tracker:
     def _estimate(self, found: Update, available_ns: int, stages: dict[str, int]) -> Estimate:
         state = found.state
         covariance = state.P[:REPORTED, :REPORTED].copy()
-        covariance[:3, :3] += shared_covariance(state, self._rig, self._eyes.exposure_s)
+        covariance[:3, :3] += shared_covariance(state, self._rig, self._eyes.exposure_s) + sag_covariance(state)
         return Estimate(
             t_ns=state.t_ns,
             p_BinW=frozen_array(state.p_BinW),
