@@ -1,11 +1,12 @@
-"""The small commands of `posebridge calibrate`: a board on paper."""
+"""The small commands of `posebridge calibrate`: a board on paper, one file into another."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
 
-from tools.calibrate.board import BoardKind, make_board
+from tools.calibrate.board import BoardKind, make_board, parse_pair
+from tools.calibrate.formats.convert import FileFormat, format_of, read_cameras, write_cameras
 from tools.calibrate.sheet import Paper, draw_sheet, largest_square_mm, write_sheet
 from tools.colours.write import check_target
 from tracker.errors import OperatorError
@@ -23,6 +24,36 @@ class BoardRequest:
     marker_mm: float | None
     dictionary: str
     overwrite: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ConvertRequest:
+    """One conversion. to: the format's name, None to go by the file's.  size: as typed, None if the file tells."""
+
+    file: Path
+    out: Path
+    to: str | None
+    size: str | None
+    overwrite: bool
+
+
+def convert_file(request: ConvertRequest) -> list[str]:
+    """Convert, and return what to say of it.
+
+    Raises:
+        OperatorError: no calibration, one that cannot be represented, or a file that cannot be written.
+    """
+    into = format_of(request.to, request.out)
+    size_px = None if request.size is None else parse_pair(request.size, "--size", "pixels")
+    cameras = read_cameras(request.file, size_px)
+    if len(cameras) > 1 and into in (FileFormat.ROS, FileFormat.EUROC):
+        if request.out.exists() and not request.overwrite:
+            raise OperatorError(f"{request.out}: exists already; name another, or give --overwrite")
+    else:
+        check_target(request.out, "OUT", request.overwrite)
+    lost = write_cameras(cameras, request.out, into)
+    names = ", ".join(camera.name for camera in cameras)
+    return [f"{request.out}: {into}, {names}", *([f"warning: not in this format: {lost}"] if lost else [])]
 
 
 def print_board(request: BoardRequest) -> str:

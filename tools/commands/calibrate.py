@@ -36,3 +36,22 @@ def board(
 
     request = BoardRequest(out, kind, corners, paper, square_mm, marker_mm, dictionary, overwrite)
     typer.echo(print_board(request))
+
+
+@calibrate.command()
+def convert(
+    file: Annotated[Path, typer.Argument(help="TOML, Kalibr, ROS, EuRoC or OpenCV; or a folder with mav0.")],
+    out: Annotated[Path, typer.Argument(help="The file to write; a folder for several cameras as ROS or EuRoC.")],
+    to: Annotated[
+        str | None, typer.Option(help="toml, kalibr, ros, euroc or opencv; .toml needs no asking.", metavar="FORMAT")
+    ] = None,
+    size: Annotated[
+        str | None, typer.Option(help="Image size, for OpenCV files that do not tell.", metavar="WxH")
+    ] = None,
+    overwrite: OverwriteOption = False,
+) -> None:
+    """Turn one calibration file into another; what the new one cannot hold is said on stderr."""
+    from tools.calibrate.command import ConvertRequest, convert_file
+
+    for line in convert_file(ConvertRequest(file, out, to, size, overwrite)):
+        typer.echo(f"posebridge: {line}", err=True)

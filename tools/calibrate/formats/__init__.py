@@ -1,1 +1,1 @@
-"""Files that hold calibrated cameras."""
+"""Files that hold calibrated cameras, ours and other programs'."""
