@@ -15,6 +15,7 @@ Ids = NDArray[np.int64]
 
 FEWEST_CORNERS = 8  # a pose and a homography need 4; with twice as many they can be wrong visibly
 LARGEST_WINDOW_PX, SMALLEST_WINDOW_PX = 5, 2  # half a side, of the refinement of a corner
+REACH_PX = 5  # round a corner, of the part in which sharpness is read
 _STOP = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 100, 1e-4)
 _CHESSBOARD = cv2.CALIB_CB_ADAPTIVE_THRESH | cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_FAST_CHECK
 
@@ -58,8 +59,10 @@ class Finder:
         if np.linalg.matrix_rank(grid_m - grid_m.mean(axis=0)) < 2:
             return None
         homography, _ = cv2.findHomography(grid_m, uv_px)
-        outline = cv2.perspectiveTransform(self.board.outline_m.reshape(-1, 1, 2), homography).reshape(-1, 2)
-        return View(name, t_ns, ids, uv_px, np.asarray(outline), edge_width_px(grey, uv_px))
+        outline = np.asarray(cv2.perspectiveTransform(self.board.outline_m[:, None], homography), dtype=np.float64)[
+            :, 0
+        ]
+        return View(name, t_ns, ids, uv_px, outline, edge_width_px(grey, uv_px, outline))
 
     def _chessboard(self, grey: Image) -> tuple[Ids, Array] | None:
         size = (self.board.columns, self.board.rows)
@@ -83,20 +86,27 @@ class Finder:
         return numbers[order], np.asarray(corners, dtype=np.float64).reshape(-1, 2)[order]
 
 
-def edge_width_px(grey: Image, uv_px: Array) -> float:
-    """Return the median width of the edges at corners (n, 2) [px]: contrast by steepest slope.
+def edge_width_px(grey: Image, uv_px: Array, outline_px: Array) -> float:
+    """Return how wide the edges at corners (n, 2) are [px]: contrast by steepest slope, in the worse direction of the two.
 
-    A step through a lens and pixels of one pixel each measures about 2 px. NaN if no corner lies well inside.
+    A motion along one set of edges leaves those sharp, hence the two. A step through a lens and pixels of one pixel
+    each measures about 2 px. NaN if no corner lies well inside.
+
+    Args:
+        outline_px: (4, 2) the board's outermost corners, which tell how its edges run.
     """
+    along = np.array([outline_px[1] - outline_px[0], outline_px[3] - outline_px[0]])
+    normals = along[:, ::-1] * (-1.0, 1.0) / np.linalg.norm(along, axis=1, keepdims=True)
     widths = []
     for u, v in np.rint(uv_px).astype(int):
-        part = grey[max(v - 5, 0) : v + 6, max(u - 5, 0) : u + 6].astype(np.float64)
-        if part.shape != (11, 11):
+        part = grey[max(v - REACH_PX, 0) : v + REACH_PX + 1, max(u - REACH_PX, 0) : u + REACH_PX + 1].astype(np.float64)
+        if part.shape != (2 * REACH_PX + 1, 2 * REACH_PX + 1):
             continue
         down, right = np.gradient(part)
-        steepest = float(np.percentile(np.hypot(down, right), 95))
-        widths.append(float(np.ptp(np.percentile(part, (5, 95)))) / max(steepest, 1e-9))
-    return float(np.median(widths)) if widths else float("nan")
+        slopes = np.abs(np.column_stack((right.ravel(), down.ravel())) @ normals.T)
+        contrast = float(np.ptp(np.percentile(part, (5, 95))))
+        widths.append(contrast / np.maximum(np.percentile(slopes, 95, axis=0), 1e-9))
+    return float(np.median(widths, axis=0).max()) if widths else float("nan")
 
 
 def _window_px(grid: Array) -> int:

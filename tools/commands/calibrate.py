@@ -7,6 +7,10 @@ from typing import Annotated
 
 import typer
 
+from tools.commands.common import ConfigOption, JsonOption, clocks_of
+
+EXIT_CALIBRATION_NOT_GOOD = 1
+
 calibrate = typer.Typer(help="Calibrate cameras: print a board, find intrinsics, convert files (docs/calibrate.md).")
 
 KindOption = Annotated[str, typer.Option("--board", help="charuco or chessboard.", metavar="KIND")]
@@ -55,3 +59,43 @@ def convert(
 
     for line in convert_file(ConvertRequest(file, out, to, size, overwrite)):
         typer.echo(f"posebridge: {line}", err=True)
+
+
+@calibrate.command()
+def intrinsics(
+    context: typer.Context,
+    config: ConfigOption = "lab",
+    source: Annotated[
+        str, typer.Option(help="images:LEFT*.png,RIGHT*.png (a glob or folder a camera), or as for run.", metavar="URI")
+    ] = "camera:0,1",
+    kind: KindOption = "charuco",
+    corners: CornersOption = "9x6",
+    square_mm: Annotated[
+        float, typer.Option("--square_mm", "--square-mm", help="A square's side, measured on the print.")
+    ] = 25.0,
+    marker_mm: MarkerOption = None,
+    dictionary: DictionaryOption = "4X4_50",
+    coefficients: Annotated[int, typer.Option(help="Of lens distortion: 4, 5 or 8.")] = 5,
+    distance_m: Annotated[
+        float, typer.Option("--distance_m", "--distance-m", help="From a camera to where is flown.")
+    ] = 3.2,
+    out: Annotated[
+        Path | None, typer.Option(help="Write the cameras here, as [[rig.cameras]].", metavar="FILE")
+    ] = None,
+    to: Annotated[str | None, typer.Option(help="Another format for it, as for convert.", metavar="FORMAT")] = None,
+    picture: Annotated[Path | None, typer.Option(help="Draw coverage and errors here.", metavar="FILE.png")] = None,
+    overwrite: OverwriteOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Find each camera's lens, and how well it is known, from views of a board.
+
+    Exit code 0: good. 1: not good, with the reasons. 2: no board, too few views, or other bad input.
+    """
+    from tools.calibrate.board import make_board
+    from tools.calibrate.command import kind_of
+    from tools.calibrate.session import IntrinsicsRequest, run_intrinsics
+
+    board = make_board(kind_of(kind), corners, square_mm, marker_mm, dictionary)
+    request = IntrinsicsRequest(config, source, board, coefficients, distance_m, out, to, picture, overwrite, json)
+    if not run_intrinsics(request, clocks_of(context)).good:
+        raise typer.Exit(EXIT_CALIBRATION_NOT_GOOD)

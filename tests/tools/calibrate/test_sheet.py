@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import io
 import re
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
 import pytest
 
-from tests.tools.test_cli import posebridge, refusal
+from tests.tools.test_cli import posebridge
 from tools.calibrate.board import Board, BoardKind, make_board
+from tools.calibrate.command import BoardRequest, print_board
 from tools.calibrate.find import Finder
 from tools.calibrate.sheet import MM_PER_INCH, Paper, draw_sheet, largest_square_mm
+from tracker.errors import OperatorError
 from tracker.types import Image
 
 DPI = 150
@@ -54,18 +58,21 @@ def test_the_command_writes_one_page_of_the_papers_size_without_pictures(tmp_pat
 
 
 @pytest.mark.parametrize(
-    ("arguments", "complaint"),
+    ("wrong", "complaint"),
     [
-        (["--corners", "9"], "must be two numbers"),
-        (["--corners", "2x9"], "must be 3 to 40"),
-        (["--square_mm", "40"], "too large for A4"),
-        (["--square_mm", "-1"], "must be positive"),
-        (["--paper", "A5"], "known: A4, A3"),
-        (["--board", "dots"], "known: charuco, chessboard"),
-        (["--dictionary", "9X9"], "unknown; known:"),
-        (["--corners", "20x12"], "holds 50 markers, the board needs 136"),
+        ({"corners": "9"}, "must be two numbers"),
+        ({"corners": "2x9"}, "must be 3 to 40"),
+        ({"square_mm": 40.0}, "too large for A4"),
+        ({"square_mm": -1.0}, "must be positive"),
+        ({"marker_mm": 30.0}, "must be between 0 and the square's 25 mm"),
+        ({"paper": "A5"}, "known: A4, A3"),
+        ({"kind": "dots"}, "known: charuco, chessboard"),
+        ({"dictionary": "9X9"}, "unknown; known:"),
+        ({"corners": "20x12"}, "holds 50 markers, the board needs 136"),
     ],
 )
-def test_a_board_that_cannot_be_is_one_line(arguments: list[str], complaint: str, tmp_path: Path) -> None:
-    assert complaint in refusal("calibrate", "board", "--out", tmp_path / "a.pdf", *arguments)
+def test_a_board_that_cannot_be_is_refused(wrong: dict[str, Any], complaint: str, tmp_path: Path) -> None:
+    usual = BoardRequest(tmp_path / "a.pdf", "charuco", "9x6", "A4", None, None, "4X4_50", False)
+    with pytest.raises(OperatorError, match=re.escape(complaint)):
+        print_board(replace(usual, **wrong))
     assert not (tmp_path / "a.pdf").exists()

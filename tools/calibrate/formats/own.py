@@ -55,7 +55,7 @@ def write_own(cameras: Sequence[Camera], path: Path, remarks: Sequence[str] = ()
     known = placed(cameras)
     for remark in (
         *remarks,
-        "Put these tables into a config in place of its [[rig.cameras]].",
+        "Put these values into a config's [[rig.cameras]]; its keys for live cameras are not repeated here.",
         *([] if known else [NOT_PLACED]),
     ):
         document.add(tomlkit.comment(remark))
