@@ -87,10 +87,10 @@ class Finder:
 
 
 def edge_width_px(grey: Image, uv_px: Array, outline_px: Array) -> float:
-    """Return how wide the edges at corners (n, 2) are [px]: contrast by steepest slope, in the worse direction of the two.
+    """Return how wide the edges at corners (n, 2) are [px]: contrast by steepest slope, in the worse direction.
 
-    A motion along one set of edges leaves those sharp, hence the two. A step through a lens and pixels of one pixel
-    each measures about 2 px. NaN if no corner lies well inside.
+    A motion along one set of edges leaves those sharp, hence both directions. A step through a lens and pixels of one
+    pixel each measures about 2 px. NaN if no corner lies well inside.
 
     Args:
         outline_px: (4, 2) the board's outermost corners, which tell how its edges run.

@@ -64,7 +64,7 @@ def run_intrinsics(request: IntrinsicsRequest, clocks: Clocks) -> Calibration:
         if path is not None:
             check_target(path, option, request.overwrite)
     footage = open_footage(request.source, load_settings(request.config), clocks)
-    gathering = _look(footage, request)
+    gathering = look(footage, request)
     result = calibrate_all(footage.names, gathering, request.board, request.coefficients, request.distance_m)
     if request.out is not None and into is not None:
         day = datetime.fromtimestamp(clocks.wall() / 1e9, UTC).date()
@@ -84,8 +84,12 @@ def _remarks(result: Calibration) -> list[str]:
     ]
 
 
-def _look(footage: Footage, request: IntrinsicsRequest) -> Gathering:
-    """Find the board in every picture; a live source goes on until it is enough, or until it is interrupted."""
+def look(footage: Footage, request: IntrinsicsRequest) -> Gathering:
+    """Find the board in every picture; a live source goes on until it is enough, or until it is interrupted.
+
+    Raises:
+        OperatorError: no sharp view of the board at all, or pictures of two sizes.
+    """
     console = Console(stderr=True)
     for warning in footage.warnings:
         console.print(f"posebridge: warning: {warning}", style="yellow", soft_wrap=True, highlight=False)
