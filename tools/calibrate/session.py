@@ -14,6 +14,7 @@ from tools.calibrate.board import Board
 from tools.calibrate.find import Finder, View
 from tools.calibrate.footage import Footage, Instant, open_footage
 from tools.calibrate.formats.convert import format_of, write_cameras
+from tools.calibrate.formats.poses import placed
 from tools.calibrate.intrinsics import FLAGS
 from tools.calibrate.picture import draw_calibration
 from tools.calibrate.report import to_json, to_text
@@ -77,11 +78,20 @@ def run_intrinsics(request: IntrinsicsRequest, clocks: Clocks) -> Calibration:
 
 
 def _remarks(result: Calibration) -> list[str]:
-    return [
+    """Say in the file itself what its values are worth."""
+    remarks = [
         f"{camera.name}: {len(camera.views)} views, error {camera.lens.rms_px:.3f} px, held out "
         f"{camera.held_out.rms_px:.3f} px" + ("" if verdict.good else "; NOT GOOD: " + "; ".join(verdict.against))
         for camera, verdict in zip(result.cameras, result.verdicts, strict=True)
     ]
+    for pair, verdict in result.pairs:
+        said = "" if verdict.good else "; NOT GOOD: " + "; ".join(verdict.against)
+        remarks.append(f"{' and '.join(pair.names)}: {len(pair.errors_px)} pairs, error {pair.rms_px:.3f} px{said}")
+    if placed(result.rig()):
+        remarks.append(
+            f"Poses are in {result.cameras[0].name}'s frame, z along its axis: NOT the room's, not for flight."
+        )
+    return remarks
 
 
 def look(footage: Footage, request: IntrinsicsRequest) -> Gathering:

@@ -52,7 +52,7 @@ def judge_pair(pair: Stereo, one: Intrinsics, other: Intrinsics) -> Verdict:
     return Verdict(
         (
             f"together they fit to {pair.rms_px:.2f} px, each alone to {alone_px:.2f} px: the pictures are not of the "
-            "same instants, or a camera moved; hold the board still for each view",
+            "same instants, a camera moved, or the board is larger than --corners; hold it still for each view",
         ),
         (),
     )
