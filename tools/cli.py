@@ -15,6 +15,7 @@ import typer
 
 from tools.commands import fly, identify, logs, prepare
 from tools.commands.bench import bench
+from tools.commands.calibrate import calibrate
 from tools.commands.common import RealClocks
 from tools.request import Clocks, CpuClocks
 from tracker.errors import OperatorError
@@ -31,6 +32,7 @@ _COMMANDS = (
 for command in _COMMANDS:
     app.command()(command)
 app.add_typer(bench, name="bench")
+app.add_typer(calibrate, name="calibrate")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
