@@ -42,6 +42,7 @@ from tracker.types import (
     TrackState,
     frozen_array,
 )
+from tracker.witness import doubted_alone
 
 ALONE_NS = 100_000_000  # one ball tells a place and no attitude: longer than this it carries no track
 NO_BREAKS: Mapping[int, float] = MappingProxyType({})
@@ -184,7 +185,9 @@ class Tracker:
         harvest.sightings += found.used
         harvest.rejections += found.rejected
         blindly = self._eyes.blind(found.state)
-        self._eyes.learn([one for one in look.fitted if one.sighting in found.used], blindly=blindly)
+        used = {(sighting.camera, sighting.ball) for sighting in found.used}
+        fitted = [one for one in look.fitted if (one.sighting.camera, one.sighting.ball) in used]
+        self._eyes.learn(fitted, blindly=blindly)
         return found
 
     def _glance(
@@ -194,7 +197,7 @@ class Tracker:
         started_ns = self._stopwatch()
         look = self._eyes.look(frames, expected)
         looked_ns = self._stopwatch()
-        found = self._update(ahead, tuple(one.sighting for one in look.fitted))
+        found = self._update(ahead, doubted_alone([one.sighting for one in look.fitted], ahead.state))
         harvest.find_ns += looked_ns - started_ns
         harvest.filter_ns += self._stopwatch() - looked_ns
         if isinstance(found, Update) and start and not self._all_seen_twice(found):
