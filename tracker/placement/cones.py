@@ -36,7 +36,7 @@ def quadrilateral(points: Array, baseline_m: float, half_angles_rad: tuple[float
 
 
 def triangulation_error(points: Array, baseline_m: float, half_angles_rad: tuple[float, float]) -> Array:
-    """Return the paper's epsilon_P (n,) [m]: the distance to the farthest corner of the region, infinite if it is open."""
+    """Return the paper's epsilon_P (n,) [m]: how far the region's farthest corner is; infinite if it is open."""
     corners = quadrilateral(points, baseline_m, half_angles_rad)
     distances = np.linalg.norm(corners - points[:, None, :], axis=2)
     return np.asarray(np.where(np.isnan(distances).any(axis=1), np.inf, distances.max(axis=1)))

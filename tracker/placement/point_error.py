@@ -53,7 +53,7 @@ def worst_errors(poses: Iterable[tuple[float, float, float]], side_m: float, err
 def drawn_errors(
     poses: Iterable[tuple[float, float, float]], side_m: float, error_m: float, rng: np.random.Generator
 ) -> Array:
-    """Return the largest error (3,) [rad] met when each point of each pose is drawn once within error_m of its place."""
+    """Return the largest error (3,) [rad] when each point of each pose is drawn once within error_m of its place."""
     worst = np.zeros(3)
     for pose in poses:
         v = rng.normal(size=(3, 3))
@@ -85,6 +85,6 @@ def _angles(places: Array) -> Sequence[float]:
         ValueError: no attitude: error or range so large that the marker stands on end or lies in a line.
     """
     found = attitude(*places)
-    if isinstance(found, Rejected):
-        raise ValueError(f"no attitude from the displaced points: {found.detail}; give less error or range")
-    return found
+    if not isinstance(found, Rejected):
+        return found
+    raise ValueError(f"no attitude from the displaced points: {found.detail}; give less error or range")

@@ -48,7 +48,7 @@ def test_equal_cones_keep_the_arc_whatever_baseline_and_angle(baseline_m: float,
 
 
 def test_unequal_cones_leave_the_arc_no_level_line() -> None:
-    """The paper says the minimum holds whatever theta_A and theta_B; towards the camera of the wider cone it is less."""
+    """The paper says the minimum holds whatever theta_A and theta_B; near the camera of the wider cone it is less."""
     wide, narrow = 2.0 * PAPER_HALF_ANGLE_RAD, PAPER_HALF_ANGLE_RAD
     near_b, near_a = triangulation_error(half_circle(2, PAPER_BASELINE_M, 0.05), PAPER_BASELINE_M, (wide, narrow))
     assert near_b / near_a == pytest.approx(2.0, rel=0.01)
