@@ -13,7 +13,7 @@ from typing import Annotated
 
 import typer
 
-from tools.commands import fly, identify, logs, prepare
+from tools.commands import fly, identify, logs, place, prepare
 from tools.commands.bench import bench
 from tools.commands.calibrate import calibrate
 from tools.commands.common import RealClocks
@@ -26,8 +26,8 @@ ONE_THREAD_EACH = ("OPENCV_FOR_THREADS_NUM", "OPENBLAS_NUM_THREADS", "OMP_NUM_TH
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 _COMMANDS = (
-    fly.run, fly.demo, logs.replay, logs.compare, logs.export, logs.monitor,
-    prepare.key, prepare.colours, fly.sitl, prepare.check, identify.excite, identify.sysid,
+    fly.run, fly.demo, logs.replay, logs.compare, logs.export, logs.monitor, prepare.key, prepare.colours, place.place,
+    fly.sitl, prepare.check, identify.excite, identify.sysid,
 )  # fmt: skip
 for command in _COMMANDS:
     app.command()(command)

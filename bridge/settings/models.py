@@ -19,6 +19,7 @@ Pixels = Annotated[int, Strict(), Field(gt=0)]
 Byte = Annotated[int, Strict(), Field(ge=0, le=255)]
 Name = Annotated[str, Field(min_length=1)]
 Triple = Annotated[tuple[Real, ...], Field(min_length=3, max_length=3)]
+Range = Annotated[tuple[Real, ...], Field(min_length=2, max_length=2)]
 Row = Annotated[tuple[Real, ...], Field(min_length=4, max_length=4)]
 
 MessageName = Literal["VISION_POSITION_ESTIMATE", "ATT_POS_MOCAP", "VISION_SPEED_ESTIMATE", "ODOMETRY"]
@@ -226,6 +227,41 @@ class LinkSettings(Section):
         return self
 
 
+class MountSettings(Section):
+    """A box of the room in which a camera may stand, flat or a line if it likes."""
+
+    name: Name
+    x_m: Range
+    y_m: Range
+    z_m: Range
+
+
+class PlaceSettings(Section):
+    """What `posebridge place` may choose from; nothing else reads it."""
+
+    room_x_m: Range = (-2.5, 2.5)
+    room_y_m: Range = (-2.5, 2.5)
+    room_z_m: Range = (-1.2, 2.4)
+    volume_x_m: Range = (-1.0, 1.0)
+    volume_y_m: Range = (-0.5, 0.5)
+    volume_z_m: Range = (-0.75, 0.75)
+    walls: tuple[Literal["x-", "x+", "y-", "y+", "ceiling"], ...] = ("x-", "x+", "y-", "y+", "ceiling")
+    wall_z_m: Range = (0.0, 2.3)
+    clearance_m: NotNegative = 0.1
+    mounts: tuple[MountSettings, ...] = ()
+    apart_m: NotNegative = 0.3
+    lenses_deg: Annotated[tuple[Annotated[float, Strict(), Field(gt=1, lt=150)], ...], Field(min_length=1)] = (
+        30.0, 45.0, 60.0, 75.0,
+    )  # fmt: skip
+    width_px: Pixels = 640
+    height_px: Pixels = 480
+    tilt_deg: Annotated[float, Strict(), Field(ge=0, le=80)] = 20.0
+    grey_noise: Annotated[float, Strict(), Field(gt=0, le=1)] = 0.03
+    blur_px: Positive = 0.5
+    least_radius_px: Positive = 1.5
+    coverage_min: Share = 0.99
+
+
 class Settings(Section):
     """A whole config."""
 
@@ -238,6 +274,7 @@ class Settings(Section):
     monitor: MonitorSettings = MonitorSettings()
     log: LogSettings = LogSettings()
     vehicle: VehicleSettings | None = None
+    place: PlaceSettings = PlaceSettings()
     links: tuple[LinkSettings, ...] = ()
 
     @model_validator(mode="after")
