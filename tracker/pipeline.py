@@ -197,7 +197,9 @@ class Tracker:
         started_ns = self._stopwatch()
         look = self._eyes.look(frames, expected)
         looked_ns = self._stopwatch()
-        found = self._update(ahead, doubted_alone([one.sighting for one in look.fitted], ahead.state))
+        found = self._update(
+            ahead, doubted_alone([one.sighting for one in look.fitted], None if start else self._history.newest)
+        )
         harvest.find_ns += looked_ns - started_ns
         harvest.filter_ns += self._stopwatch() - looked_ns
         if isinstance(found, Update) and start and not self._all_seen_twice(found):

@@ -15,17 +15,17 @@ import numpy as np
 from tracker.state import ATTITUDE, State
 from tracker.types import BallSighting, frozen_array
 
-OPEN_RAD = 0.003  # one sigma of attitude: well beyond what three balls leave, far below what shows in a pixel's gate
+OPEN_RAD = 0.005  # one sigma of attitude: well beyond what three balls leave
 DOUBT_PX = 1.5  # one sigma: half a ball's radius and more
 
 
-def doubted_alone(sightings: Sequence[BallSighting], prior: State) -> tuple[BallSighting, ...]:
+def doubted_alone(sightings: Sequence[BallSighting], last: State | None) -> tuple[BallSighting, ...]:
     """Return the sightings of one instant; while a turn is open, less sure where a second camera should bear them out.
 
-    prior: carried to that instant.
+    last: what the sightings before left known; None while nothing is tracked.
     """
     cameras = {sighting.camera for sighting in sightings}
-    if len(cameras) < 2 or float(prior.P.diagonal()[ATTITUDE].max()) < OPEN_RAD**2:
+    if last is None or len(cameras) < 2 or float(last.P.diagonal()[ATTITUDE].max()) < OPEN_RAD**2:
         return tuple(sightings)
     seen = [sighting.ball for sighting in sightings]
     return tuple(_doubted(one) if seen.count(one.ball) == 1 else one for one in sightings)
