@@ -43,10 +43,10 @@ def to_text(placement: Placement, limits: Limits) -> str:
     lines += [
         f"  two cameras have every ball in the picture   {100 * figures.covered:6.1f} % of the poses",
         f"  and no ball stands behind another            {100 * figures.clear:6.1f} %",
-        f"  position, rms                                {figures.position_mm:6.2f} mm   {figures.worst_position_mm:.2f} mm "
-        "at the worst point",
-        f"  attitude, rms                                {figures.attitude_deg:6.2f} deg  {figures.worst_attitude_deg:.2f} deg "
-        "at the worst point",
+        f"  position, rms                                {figures.position_mm:6.2f} mm   "
+        f"{figures.worst_position_mm:.2f} mm at the worst point",
+        f"  attitude, rms                                {figures.attitude_deg:6.2f} deg  "
+        f"{figures.worst_attitude_deg:.2f} deg at the worst point",
     ]
     if placement.proof is not None:
         lines += ["", *_proof_lines(placement.proof)]
@@ -90,14 +90,16 @@ def _proof_lines(proof: Proof) -> list[str]:
         f"A simulated flight through the volume: {proof.estimates} estimates of {proof.frames} instants",
         "                    flown     forecast   ratio",
         f"  position, rms  {proof.position_mm:8.3f} {proof.expected_position_mm:8.3f} mm  {proof.position_ratio:6.2f}",
-        f"  attitude, rms  {proof.attitude_deg:8.3f} {proof.expected_attitude_deg:8.3f} deg {proof.attitude_ratio:6.2f}",
+        f"  attitude, rms  {proof.attitude_deg:8.3f} {proof.expected_attitude_deg:8.3f} deg "
+        f"{proof.attitude_ratio:6.2f}",
     ]
 
 
 def _move_lines(placement: Placement) -> list[str]:
     lines = [
         "A camera moved, still looking at the same point: change of the figures",
-        f"  {'camera':10} {'step, m':>18} {'covered, %':>12} {'position, mm':>14} {'worst, mm':>12} {'attitude, deg':>14}",
+        f"  {'camera':10} {'step, m':>18} {'covered, %':>12} {'position, mm':>14} {'worst, mm':>12} "
+        f"{'attitude, deg':>14}",
     ]
     for move in placement.moves:
         a, b = move.before, move.after
