@@ -25,7 +25,8 @@ ONE_THREAD_EACH = ("OPENCV_FOR_THREADS_NUM", "OPENBLAS_NUM_THREADS", "OMP_NUM_TH
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 _COMMANDS = (
-    fly.run, fly.demo, logs.replay, logs.export, logs.monitor, prepare.key, prepare.colours, place.place, fly.sitl, prepare.check,
+    fly.run, fly.demo, logs.replay, logs.export, logs.monitor, prepare.key, prepare.colours, fly.sitl,
+    place.place, prepare.check,
 )  # fmt: skip
 for command in _COMMANDS:
     app.command()(command)

@@ -18,37 +18,41 @@ from tools.place.limits import Limits
 from tracker.camera import Camera
 from tracker.types import Array
 
-INK, PALE, VOLUME = "#22313f", "#8a939b", "#2c6fbb"
+INK, VOLUME = "#22313f", "#2c6fbb"
 CAMERAS = ("#c0392b", "#2c6fbb", "#2e8b57", "#8e44ad", "#d9822b", "#16a085", "#7f5539", "#c2317f")
+LABELS = ((9.0, 7.0), (-9.0, 7.0), (9.0, -15.0), (-9.0, -15.0))
 VIEWS = (("from above", 0, 1), ("from the side, along y", 0, 2))
 """Title, and the room's axes to the right and up."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layer:
-    """One quantity over the points: title, colours, values (n,), and how the hidden axis is summed up."""
+    """One quantity over the points: title, colours, values (n,), and their limits on the scale."""
 
     title: str
     colours: str
     values: Array
-    worst_is_high: bool
+    limits: tuple[float, float]
+    share: bool = False
 
 
 def draw_map(found: Survey, cameras: Sequence[Camera], limits: Limits, path: Path) -> None:
     """Draw a PNG: the room with its cameras, then position, attitude and coverage in the volume, in two views."""
-    figure = Figure(figsize=(17.5, 9.0), layout="constrained", facecolor="white")
+    figure = Figure(figsize=(17.5, 8.2), layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
     figures = found.figures
     figure.suptitle(
-        f"{len(cameras)} cameras: {figures.position_mm:.2f} mm and {figures.attitude_deg:.2f} deg to be expected (rms), "
-        f"{100 * figures.covered:.0f} % of the poses in two pictures",
+        f"{len(cameras)} cameras: {figures.position_mm:.2f} mm and {figures.attitude_deg:.2f} deg to be expected "
+        f"(rms), {100 * figures.covered:.0f} % of the poses in two pictures",
         fontsize=15, fontweight="bold", color=INK,
     )  # fmt: skip
     panels = figure.subplots(2, 4, width_ratios=[1.5, 1, 1, 1])
+    position_mm = found.per_point(1e3 * found.expected.position_m)
+    attitude_deg = found.per_point(np.degrees(found.expected.attitude_rad))
     layers = (
-        Layer("position, rms (mm)", "viridis_r", found.per_point(1e3 * found.expected.position_m), True),
-        Layer("attitude, rms (deg)", "magma_r", found.per_point(np.degrees(found.expected.attitude_rad)), True),
-        Layer("in two pictures (% of attitudes)", "YlGnBu", 100.0 * found.coverage, False),
+        Layer("position, worst (mm)", "viridis_r", position_mm, _limits(position_mm)),
+        Layer("attitude, worst (deg)", "viridis_r", attitude_deg, _limits(attitude_deg)),
+        Layer("in two pictures (% of poses)", "RdYlGn", 100.0 * found.coverage, (0.0, 100.0), share=True),
     )
     for row, (title, right, up) in zip(panels, VIEWS, strict=True):
         _room(row[0], title, (right, up), cameras, limits)
@@ -65,16 +69,17 @@ def _room(axes: Axes, title: str, view: tuple[int, int], cameras: Sequence[Camer
         colour = CAMERAS[index % len(CAMERAS)]
         _pyramid(axes, camera, limits, k, colour)
         axes.annotate(
-            f"{camera.name}, {view_deg(camera):.0f}°", camera.p_CinW[k], (7, 7), textcoords="offset points",
+            f"{camera.name}, {view_deg(camera):.0f}°", _pair(camera.p_CinW[k]), LABELS[index % len(LABELS)],
+            textcoords="offset points", ha="right" if index % 2 else "left",
             fontsize=9, fontweight="bold", color=colour, zorder=6,
             bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.75},
         )  # fmt: skip
     style = {"fc": "none", "ec": VOLUME, "lw": 1.8, "ls": (0, (4, 2)), "zorder": 4}
     _box(axes, limits.volume.low[k], limits.volume.high[k], style)
-    corner = limits.volume.low[k]
+    corner = _pair(limits.volume.low[k])
     axes.annotate("flown", corner, (3, 3), textcoords="offset points", fontsize=8, color=VOLUME, zorder=5)
     reach = limits.room.high[k] - limits.room.low[k]
-    axes.set_xlim(limits.room.low[k[0]] - 0.08 * reach[0], limits.room.high[k[0]] + 0.16 * reach[0])
+    axes.set_xlim(limits.room.low[k[0]] - 0.16 * reach[0], limits.room.high[k[0]] + 0.16 * reach[0])
     axes.set_ylim(limits.room.low[k[1]] - 0.08 * reach[1], limits.room.high[k[1]] + 0.12 * reach[1])
     _style(axes, f"the room {title}", view)
 
@@ -95,32 +100,36 @@ def _pyramid(axes: Axes, camera: Camera, limits: Limits, k: list[int], colour: s
 
 
 def _layer(axes: Axes, layer: Layer, view: tuple[int, int], points: Array) -> None:
-    """Draw one quantity; of the points behind each other the worst one counts."""
+    """Draw one quantity; of points behind each other the worst known error counts, of shares their mean."""
     right, up = (np.unique(points[:, k].round(9)) for k in view)
     place = np.searchsorted(up, points[:, view[1]] - 1e-6), np.searchsorted(right, points[:, view[0]] - 1e-6)
-    worst = np.full((len(up), len(right)), -np.inf if layer.worst_is_high else np.inf)
-    # A point where nothing is known is worse than any other: NaN wins.
-    (np.maximum if layer.worst_is_high else np.minimum).at(worst, place, layer.values)
-    known = worst[np.isfinite(worst)]
-    low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
-    if not layer.worst_is_high:
-        low, high = 0.0, 100.0
+    shown = np.full((len(up), len(right)), 0.0 if layer.share else np.nan)
+    if layer.share:
+        np.add.at(shown, place, layer.values * len(up) * len(right) / len(points))
+    else:
+        np.fmax.at(shown, place, layer.values)
     axes.set_facecolor("#e3e3e0")
-    mesh = axes.pcolormesh(
-        right, up, worst, cmap=layer.colours, vmin=low, vmax=max(high, low * 1.02 + 1e-9), shading="nearest"
-    )
-    if not np.isfinite(worst).all():
-        axes.text(
-            0.5, -0.2, "grey: not covered", transform=axes.transAxes, ha="center", va="top", fontsize=8, color=PALE
-        )
-    bar = axes.figure.colorbar(mesh, ax=axes, shrink=0.8, pad=0.02)
+    low, high = layer.limits
+    mesh = axes.pcolormesh(right, up, shown, cmap=layer.colours, vmin=low, vmax=high, shading="nearest")
+    bar = axes.figure.colorbar(mesh, ax=axes, shrink=0.75, pad=0.02)
     bar.ax.tick_params(labelsize=8)
-    _style(axes, layer.title, view)
+    _style(axes, layer.title + ("" if np.isfinite(shown).all() else ", grey: none"), view)
+
+
+def _limits(values: Array) -> tuple[float, float]:
+    """Return the scale's ends, the same in both views."""
+    known = values[np.isfinite(values)]
+    low, high = (float(known.min()), float(known.max())) if len(known) else (0.0, 1.0)
+    return low, max(high, 1.02 * low)
 
 
 def _box(axes: Axes, low: Array, high: Array, style: dict[str, object]) -> None:
     width, height = (high - low).tolist()
     axes.add_patch(Rectangle((float(low[0]), float(low[1])), width, height, **style))  # type: ignore[arg-type]
+
+
+def _pair(point: Array) -> tuple[float, float]:
+    return float(point[0]), float(point[1])
 
 
 def _style(axes: Axes, title: str, view: tuple[int, int]) -> None:

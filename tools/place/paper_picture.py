@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
-from mpl_toolkits.mplot3d.axes3d import Axes3D
+from mpl_toolkits.mplot3d.axes3d import Axes3D  # type: ignore[import-untyped]
 
 from tracker.placement.axes import PAPER_OPTIMUM, axis, orientations, total_motion
 from tracker.placement.cones import (
@@ -33,13 +33,13 @@ ORIENTATION_STEP = math.radians(7.5)
 
 def draw_cones(path: Path) -> None:
     """Draw fig. 3, and beside it fig. 2's region true to scale at three points."""
-    figure = Figure(figsize=(14.5, 6.6), layout="constrained", facecolor="white")
+    figure = Figure(figsize=(15.5, 5.9), layout="constrained", facecolor="white")
     FigureCanvasAgg(figure)
     figure.suptitle(
         "Triangulation error in the epipolar plane: least where the rays meet at a right angle",
         fontsize=14, fontweight="bold", color=INK,
     )  # fmt: skip
-    left, right = figure.subplots(1, 2, width_ratios=[1.75, 1])
+    left, right = figure.subplots(1, 2, width_ratios=[1.6, 1])
     _error_map(left)
     _regions(right)
     figure.savefig(path, dpi=110)
@@ -94,12 +94,12 @@ def _regions(axes: Axes) -> None:
         point = np.array([[0.0, height]])
         corners_mm = 1e3 * (quadrilateral(point, PAPER_BASELINE_M, CONES)[0] - point[0])
         error_mm = 1e3 * float(triangulation_error(point, PAPER_BASELINE_M, CONES)[0])
-        closed = np.vstack((corners_mm, corners_mm[:1])) + (shift, 0.0)
+        closed = np.vstack((corners_mm, corners_mm[:1])) + np.array([shift, 0.0])
         axes.fill(*closed.T, color=colour, alpha=0.18, lw=0)
         axes.plot(*closed.T, color=colour, lw=1.6)
         axes.plot(shift, 0.0, "+", color=INK, ms=8)
         for k, corner in enumerate(closed[:4]):
-            away = (corner - (shift, 0.0)) / np.linalg.norm(corner - (shift, 0.0))
+            away = corners_mm[k] / np.linalg.norm(corners_mm[k])
             axes.annotate(
                 f"P{k + 1}", corner, 11 * away, textcoords="offset points", ha="center", va="center", fontsize=8
             )
@@ -107,7 +107,7 @@ def _regions(axes: Axes) -> None:
                   fontweight="bold")  # fmt: skip
     axes.set_xlim(-54, 54)
     axes.set_ylim(-36, 36)
-    _style(axes, "fig. 2: the region between the cones, midway between the cameras", "mm", "mm")
+    _style(axes, "fig. 2: the region between the cones, midway", "mm", "mm")
 
 
 def _sphere(axes: Axes3D, swept: list[tuple[float, float, float, float]], motion: Array) -> None:
@@ -119,19 +119,19 @@ def _sphere(axes: Axes3D, swept: list[tuple[float, float, float, float]], motion
     for place, value in zip(places.round(4), np.repeat(motion, 2), strict=True):
         key = tuple((place + 0.0).tolist())
         best[key] = max(best.get(key, 0.0), float(value))
-    shown = axes.scatter(*np.array(list(best)).T, c=list(best.values()), cmap="viridis", s=9, alpha=0.75)  # type: ignore[arg-type]
+    shown = axes.scatter(*np.array(list(best)).T, c=list(best.values()), cmap="viridis", s=9, alpha=0.75)
     for (phi, psi), name, colour in ((PAPER_OPTIMUM[0::2], "A", A_COLOUR), (PAPER_OPTIMUM[1::2], "B", B_COLOUR)):
         u = axis(phi, psi)
         axes.plot(*np.vstack((np.zeros(3), 1.15 * u)).T, color=colour, lw=3.0, zorder=10)
-        axes.text(*(1.28 * u), f"{name}: φ 45°, ψ {math.degrees(psi):.0f}°", color=colour, fontsize=10, fontweight="bold",
-                  ha="center", zorder=11)  # fmt: skip
-    axes.figure.colorbar(shown, ax=axes, shrink=0.6, pad=0.06, label="best sum at this orientation (δ)")
+        label = f"{name}: φ 45°, ψ {math.degrees(psi):.0f}°"
+        axes.text(*(1.28 * u), label, color=colour, fontsize=10, fontweight="bold", ha="center", zorder=11)
+    axes.figure.colorbar(shown, ax=axes, shrink=0.6, pad=0.0, label="best sum at this orientation (δ)")
     for k, name in enumerate("xyz"):
         end = 1.25 * np.eye(3)[k]
         axes.plot(*np.vstack((np.zeros(3), end)).T, color="#999999", lw=1.0)
         axes.text(*(1.08 * end), name, color="#666666", fontsize=10)
     axes.set_title("fig. 4: orientations that meet eq. 1", fontsize=11, loc="left", color=INK)
-    axes.set_box_aspect((1, 1, 0.62))
+    axes.set_box_aspect((1, 1, 0.62), zoom=1.45)
     axes.set_axis_off()
     axes.view_init(elev=24, azim=-62)
 
@@ -150,8 +150,15 @@ def _motion_map(axes: Axes) -> None:
                          colors="white", linewidths=0.8)  # fmt: skip
     axes.clabel(lines, fmt="%g", fontsize=8)
     axes.plot(45.0, 45.0, "*", ms=20, color=ACCENT, mec="white", clip_on=False, zorder=5)
-    axes.annotate("the paper's optimum\n4.8783 δ", (45.0, 45.0), (16, -4), textcoords="offset points", fontsize=10,
-                  fontweight="bold", color="white", va="center", bbox={"boxstyle": "round,pad=0.3", "fc": ACCENT, "ec": "none"})  # fmt: skip
+    swapped = (60.0, math.degrees(math.atan(math.sqrt(2.0))))  # the same two directions with y and z swapped
+    axes.plot(*swapped, "o", ms=9, color="none", mec=ACCENT, mew=2.0, zorder=5)
+    axes.annotate(
+        "the same, y and z swapped", swapped, (-14, 14), textcoords="offset points", fontsize=9, ha="center", color=INK
+    )
+    axes.annotate(
+        "the paper's optimum\n4.8783 δ", (45.0, 45.0), (16, -22), textcoords="offset points", fontsize=10,
+        fontweight="bold", color="white", va="center", bbox={"boxstyle": "round,pad=0.3", "fc": ACCENT, "ec": "none"},
+    )  # fmt: skip
     axes.figure.colorbar(mesh, ax=axes, shrink=0.85, pad=0.01, label="sum of image motions (δ)")
     _style(
         axes,

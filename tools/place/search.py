@@ -1,9 +1,10 @@
 """Look for the camera poses that know the vehicle's pose best.
 
-First an exchange among poses on a grid, all looking at the volume's middle, as optimal designs are found: information adds
-up, so a camera is weighed against the rest without looking again. Then each camera in turn is moved and turned freely.
-Source: V. V. Fedorov, "Theory of Optimal Experiments" (1972), the exchange; J. A. Nelder, R. Mead, "A simplex method for
-    function minimization", Computer Journal 7 (1965), the rest, by scipy.
+First an exchange among poses on a grid, all looking at the volume's middle, as optimal designs are found: information
+adds up, so a camera is weighed against the rest without looking again. Then each camera in turn is moved and turned
+freely.
+Source: V. V. Fedorov, "Theory of Optimal Experiments" (1972), the exchange; J. A. Nelder, R. Mead, "A simplex method
+    for function minimization", Computer Journal 7 (1965), the rest, by scipy.
 """
 
 from __future__ import annotations
@@ -16,17 +17,20 @@ import numpy as np
 from scipy.optimize import minimize
 
 from tools.place.limits import Limits
+from tracker import so3
 from tracker.errors import OperatorError
 from tracker.placement.forecast import CAMERAS_NEEDED, ball_error, covariance_of, lever
 from tracker.placement.mount import Stand, aimed
-from tracker.placement.views import Poses, View, attitudes_within, look, poses_of
+from tracker.placement.views import View, look, poses_of
 from tracker.types import Array, frozen_array
 
 STARTS, REFINED, ROUNDS = 6, 2, 2
 MOST_CANDIDATES = 400
-SEARCH_YAWS = 3
+STEPS = 4  # along the volume's longest side
 UNCOVERED_M = 0.1
 """What a share of uncovered poses costs beside the error: 1 % as much as 1 mm."""
+UNKNOWN_M = 0.01
+"""A larger error counts as this one: where the volume cannot be covered, its share must decide."""
 AIM_STEP = math.radians(4.0)
 
 
@@ -48,9 +52,7 @@ class Search:
         self._limits = limits
         self._tell = tell
         extent = limits.volume.high - limits.volume.low
-        self._poses = poses_of(
-            limits.volume.points(float(extent.max()) / 2.0), attitudes_within(limits.tilt_rad, SEARCH_YAWS)
-        )
+        self._poses = poses_of(limits.volume.points(float(extent.max()) / STEPS), _few_attitudes(limits.tilt_rad))
         self._lever = lever(limits.marker, self._poses)
         self._boxes = {box.name: box for box in limits.mounts}
 
@@ -73,7 +75,7 @@ class Search:
 
     def cost(self, information: Array, pictured: Array) -> Array:
         """Return the cost (...) of information (..., s, 6, 6) and counts of cameras that picture a ball (..., s, n)."""
-        error = ball_error(covariance_of(information), self._lever)
+        error = np.minimum(ball_error(covariance_of(information), self._lever), UNKNOWN_M)
         by_point = np.sqrt((error.reshape(*error.shape[:-1], self._poses.points, -1) ** 2).mean(axis=-1))
         uncovered = 1.0 - (pictured >= CAMERAS_NEEDED).all(axis=-1).mean(axis=-1)
         return np.asarray(0.5 * error.mean(axis=-1) + 0.5 * by_point.max(axis=-1) + UNCOVERED_M * uncovered)
@@ -145,8 +147,8 @@ class Search:
         for _ in range(ROUNDS):
             for k, stand in enumerate(stands):
                 rest = [view for j, view in enumerate(views) if j != k]
-                information = np.sum([view.information for view in rest], axis=0)
-                pictured = np.sum([view.pictured for view in rest], axis=0, dtype=np.float64)
+                information = np.asarray(np.sum([view.information for view in rest], axis=0))
+                pictured = np.asarray(np.sum([view.pictured for view in rest], axis=0, dtype=np.float64))
                 others = np.stack([each.p_CinW for j, each in enumerate(stands) if j != k])
                 cost, stands[k] = self._move(stand, information, pictured, others)
                 views[k] = self.view(stands[k])
@@ -184,6 +186,12 @@ class Search:
         )  # fmt: skip
         best = done.x if done.fun < cost(start) else start
         return cost(best), placed(best)
+
+
+def _few_attitudes(tilt_rad: float) -> list[Array]:
+    """Return six headings, leaning to as many sides."""
+    turns = np.arange(6) * math.pi / 3.0
+    return [so3.from_euler(tilt_rad * math.cos(2.5 * t), tilt_rad * math.sin(2.5 * t), t) for t in turns.tolist()]
 
 
 def _simplex(start: Array, steps: Array) -> Array:

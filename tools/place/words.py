@@ -73,7 +73,7 @@ def config_with(config: str, cameras: Sequence[Camera], limits: Limits) -> str:
     rig = tomlkit.table()
     rig.add(tomlkit.comment(DRAWN))
     rig["calibration"] = ""
-    rig["cameras"] = drawn["rig"]["cameras"]  # type: ignore[index]
+    rig["cameras"] = drawn["rig"]["cameras"]
     document["rig"] = rig
     return tomlkit.dumps(document)
 
