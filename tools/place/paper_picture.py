@@ -153,7 +153,7 @@ def _motion_map(axes: Axes) -> None:
     swapped = (60.0, math.degrees(math.atan(math.sqrt(2.0))))  # the same two directions with y and z swapped
     axes.plot(*swapped, "o", ms=9, color="none", mec=ACCENT, mew=2.0, zorder=5)
     axes.annotate(
-        "the same, y and z swapped", swapped, (-14, 14), textcoords="offset points", fontsize=9, ha="center", color=INK
+        "the same, y and z swapped", swapped, (0, -20), textcoords="offset points", fontsize=9, ha="center", color=INK
     )
     axes.annotate(
         "the paper's optimum\n4.8783 δ", (45.0, 45.0), (16, -22), textcoords="offset points", fontsize=10,
