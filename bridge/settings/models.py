@@ -258,7 +258,7 @@ class PlaceSettings(Section):
     tilt_deg: Annotated[float, Strict(), Field(ge=0, le=80)] = 20.0
     grey_noise: Annotated[float, Strict(), Field(gt=0, le=1)] = 0.03
     blur_px: Positive = 0.5
-    least_radius_px: Positive = 1.5
+    least_radius_px: Positive = 2.0
     coverage_min: Share = 0.99
 
 

@@ -103,16 +103,16 @@ def made(folder: Path | None) -> Path | None:
     return folder
 
 
-def _tell(line: str) -> None:
-    sys.stderr.write(f"posebridge: {line}\n")
-
-
 def _cameras(request: PlaceRequest, settings: Settings, limits: Limits) -> tuple[Camera, ...]:
     if request.cameras is None:
         return rig_of(settings, None).rig.cameras
     search = Search(limits, _tell)
     stands = search.best(request.cameras, request.seed)
     return tuple(stand.camera(f"cam{k}") for k, stand in enumerate(stands))
+
+
+def _tell(line: str) -> None:
+    sys.stderr.write(f"posebridge: {line}\n")
 
 
 def _write(path: Path, text: str) -> None:

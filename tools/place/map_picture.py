@@ -69,13 +69,14 @@ def _room(axes: Axes, title: str, view: tuple[int, int], cameras: Sequence[Camer
         colour = CAMERAS[index % len(CAMERAS)]
         _pyramid(axes, camera, limits, k, colour)
         axes.annotate(
-            f"{camera.name}, {view_deg(camera):.0f}°", tuple(camera.p_CinW[k]), LABELS[index % len(LABELS)],
-            textcoords="offset points", ha="right" if index % 2 else "left", fontsize=9, fontweight="bold",
-            color=colour, zorder=6, bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.75},
+            f"{camera.name}, {view_deg(camera):.0f}°", _pair(camera.p_CinW[k]), LABELS[index % len(LABELS)],
+            textcoords="offset points", ha="right" if index % 2 else "left",
+            fontsize=9, fontweight="bold", color=colour, zorder=6,
+            bbox={"boxstyle": "round,pad=0.15", "fc": "white", "ec": "none", "alpha": 0.75},
         )  # fmt: skip
     style = {"fc": "none", "ec": VOLUME, "lw": 1.8, "ls": (0, (4, 2)), "zorder": 4}
     _box(axes, limits.volume.low[k], limits.volume.high[k], style)
-    corner = tuple(limits.volume.low[k])
+    corner = _pair(limits.volume.low[k])
     axes.annotate("flown", corner, (3, 3), textcoords="offset points", fontsize=8, color=VOLUME, zorder=5)
     reach = limits.room.high[k] - limits.room.low[k]
     axes.set_xlim(limits.room.low[k[0]] - 0.16 * reach[0], limits.room.high[k[0]] + 0.16 * reach[0])
@@ -125,6 +126,10 @@ def _limits(values: Array) -> tuple[float, float]:
 def _box(axes: Axes, low: Array, high: Array, style: dict[str, object]) -> None:
     width, height = (high - low).tolist()
     axes.add_patch(Rectangle((float(low[0]), float(low[1])), width, height, **style))  # type: ignore[arg-type]
+
+
+def _pair(point: Array) -> tuple[float, float]:
+    return float(point[0]), float(point[1])
 
 
 def _style(axes: Axes, title: str, view: tuple[int, int]) -> None:

@@ -153,11 +153,12 @@ def _motion_map(axes: Axes) -> None:
     swapped = (60.0, math.degrees(math.atan(math.sqrt(2.0))))  # the same two directions with y and z swapped
     axes.plot(*swapped, "o", ms=9, color="none", mec=ACCENT, mew=2.0, zorder=5)
     axes.annotate(
-        "the same, y and z swapped", swapped, (10, 0), textcoords="offset points", fontsize=9, va="center", color=INK
+        "the same, y and z swapped", swapped, (0, -20), textcoords="offset points", fontsize=9, ha="center", color=INK
     )
-    box = {"boxstyle": "round,pad=0.3", "fc": ACCENT, "ec": "none"}
-    axes.annotate("the paper's optimum\n4.8783 δ", (45.0, 45.0), (16, -22), textcoords="offset points", fontsize=10,
-                  fontweight="bold", color="white", va="center", bbox=box)  # fmt: skip
+    axes.annotate(
+        "the paper's optimum\n4.8783 δ", (45.0, 45.0), (16, -22), textcoords="offset points", fontsize=10,
+        fontweight="bold", color="white", va="center", bbox={"boxstyle": "round,pad=0.3", "fc": ACCENT, "ec": "none"},
+    )  # fmt: skip
     axes.figure.colorbar(mesh, ax=axes, shrink=0.85, pad=0.01, label="sum of image motions (δ)")
     _style(
         axes,

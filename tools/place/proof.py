@@ -27,7 +27,10 @@ TURN_RAD_S = math.radians(25.0)
 
 @dataclass(frozen=True, slots=True)
 class Proof:
-    """One flight: rms errors beside the rms of what was forecast for one instant's pictures at the same poses."""
+    """One flight: rms errors beside the rms of what was forecast for one instant's pictures at the same poses.
+
+    wrong: how many of all its poses lay outside 5 sigma of the covariance that the tracker gave them.
+    """
 
     estimates: int
     frames: int
@@ -35,6 +38,7 @@ class Proof:
     expected_position_mm: float
     attitude_deg: float
     expected_attitude_deg: float
+    wrong: int
 
     @property
     def position_ratio(self) -> float:
@@ -56,7 +60,7 @@ def prove(cameras: tuple[Camera, ...], limits: Limits, config: str, seed: int) -
     frames = round((DURATION_S - SETTLED_S) * RATE_HZ)
     truth = [path.pose_at(int(t_ns)) for t_ns in flown.times_ns]
     if not truth:
-        return Proof(0, frames, *(math.nan,) * 4)
+        return Proof(0, frames, *(math.nan,) * 4, wrong=0)
     poses = Poses(np.stack([p for p, _ in truth]), np.stack([R for _, R in truth]), len(truth))
     views = [look(camera, limits.marker, poses, limits.sharpness) for camera in cameras]
     expected = forecast(views, limits.marker, poses)
@@ -68,6 +72,7 @@ def prove(cameras: tuple[Camera, ...], limits: Limits, config: str, seed: int) -
         _rms(1e3 * expected.position_m[k]),
         _rms(flown.attitude_deg[k]),
         _rms(np.degrees(expected.attitude_rad[k])),
+        len(flown.wrong()),
     )
 
 

@@ -31,7 +31,7 @@ class Placement:
 
 def to_text(placement: Placement, limits: Limits) -> str:
     """Return the page."""
-    figures = placement.figures
+    f = placement.figures
     title = f"{len(placement.cameras)} cameras, " + (
         "placed by search" if placement.searched else "as the config has them"
     )
@@ -41,12 +41,10 @@ def to_text(placement: Placement, limits: Limits) -> str:
         lines += [f"  {first}", f"        {second}"]
     lines += ["", "Expected of one instant's pictures, over the volume and all headings and leans"]
     lines += [
-        f"  two cameras have every ball in the picture   {100 * figures.covered:6.1f} % of the poses",
-        f"  and no ball stands behind another            {100 * figures.clear:6.1f} %",
-        f"  position, rms                                {figures.position_mm:6.2f} mm   "
-        f"{figures.worst_position_mm:.2f} mm at the worst point",
-        f"  attitude, rms                                {figures.attitude_deg:6.2f} deg  "
-        f"{figures.worst_attitude_deg:.2f} deg at the worst point",
+        f"  two cameras have every ball in the picture {100 * f.covered:6.1f} % of the poses",
+        f"  and no ball stands behind another          {100 * f.clear:6.1f} %",
+        f"  position, rms                              {f.position_mm:6.2f} mm   {f.worst_position_mm:.2f} mm worst",
+        f"  attitude, rms                              {f.attitude_deg:6.2f} deg  {f.worst_attitude_deg:.2f} deg worst",
     ]
     if placement.proof is not None:
         lines += ["", *_proof_lines(placement.proof)]
@@ -89,9 +87,9 @@ def _proof_lines(proof: Proof) -> list[str]:
     return [
         f"A simulated flight through the volume: {proof.estimates} estimates of {proof.frames} instants",
         "                    flown     forecast   ratio",
-        f"  position, rms  {proof.position_mm:8.3f} {proof.expected_position_mm:8.3f} mm  {proof.position_ratio:6.2f}",
-        f"  attitude, rms  {proof.attitude_deg:8.3f} {proof.expected_attitude_deg:8.3f} deg "
-        f"{proof.attitude_ratio:6.2f}",
+        f"  position, rms  {proof.position_mm:8.3f} {proof.expected_position_mm:8.3f} mm {proof.position_ratio:7.2f}",
+        f"  attitude, rms  {proof.attitude_deg:8.3f} {proof.expected_attitude_deg:8.3f} deg{proof.attitude_ratio:7.2f}",
+        f"  beyond 5 sigma of the tracker's own covariance: {proof.wrong}, wanted 0",
     ]
 
 
