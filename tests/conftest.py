@@ -39,6 +39,15 @@ def shared() -> Path:
 
 
 @pytest.fixture(scope="session")
+def chessboard_pairs(shared: Path) -> Path:
+    """Return the folder of real stereo chessboard pairs; lacking, it fails in CI and skips on a user's machine."""
+    folder = shared / "chessboard-stereo"
+    if not folder.is_dir():
+        _lacking(f"no chessboard pairs in {folder}")
+    return folder
+
+
+@pytest.fixture(scope="session")
 def full_disk() -> Path:
     """Return a file on a disk that is always full; one that is lacking fails in CI and skips on a user's machine."""
     device = Path("/dev/full")

@@ -32,14 +32,11 @@ def calibrated(seen: list[tuple[Array, Array]], seed: int = 0, coefficients: int
 
 
 @pytest.fixture(scope="module")
-def pairs(shared: Path) -> Calibration:
+def pairs(chessboard_pairs: Path) -> Calibration:
     """Return the 13 real pairs calibrated, as the command does it."""
-    folder = shared / "chessboard-stereo"
-    if not folder.is_dir():
-        pytest.skip("no chessboard pairs here")
     board = make_board(BoardKind.CHESSBOARD, "9x6", 1000.0)
     finder, gathering = Finder(board), Gathering({0: SIZE_PX, 1: SIZE_PX}, chosen=True)
-    for left in sorted(folder.glob("left*.jpg")):
+    for left in sorted(chessboard_pairs.glob("left*.jpg")):
         files = left, left.with_name(left.name.replace("left", "right"))
         found: dict[int, View | None] = {}
         for camera, path in enumerate(files):
