@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from types import MappingProxyType
 
 from tracker.acquire import Seen, first_state
@@ -18,20 +18,21 @@ from tracker.bias import shared_covariance
 from tracker.cadence import Cadence
 from tracker.continuity import Continuity
 from tracker.detect import Blob
-from tracker.ekf import Update, update
+from tracker.ekf import Update
 from tracker.eyes import Eyes
+from tracker.harvest import Harvest
 from tracker.history import History
 from tracker.intake import Intake
-from tracker.look import Look, look_everywhere
+from tracker.look import look_everywhere
 from tracker.predict import Prediction, first_guess, predict
 from tracker.rig import Rig
 from tracker.rounds import Rounds
 from tracker.sag import sag_covariance
 from tracker.state import OFFSETS, REPORTED, State
+from tracker.study import Round, Study
 from tracker.tint import Gains
 from tracker.tuning import Tuning
 from tracker.types import (
-    BallSighting,
     Estimate,
     Event,
     Frame,
@@ -42,31 +43,9 @@ from tracker.types import (
     TrackState,
     frozen_array,
 )
-from tracker.witness import doubted_alone
 
 ALONE_NS = 100_000_000  # one ball tells a place and no attitude: longer than this it carries no track
 NO_BREAKS: Mapping[int, float] = MappingProxyType({})
-
-Round = tuple[Frame, ...]
-
-
-@dataclass(slots=True, eq=False)
-class _Harvest:
-    """What the rounds of one step gave so far.
-
-    find_ns, filter_ns: time that looking for balls and updating by them took, since the last estimate [ns].
-    """
-
-    sightings: list[BallSighting] = field(default_factory=list)
-    rejections: list[Rejected] = field(default_factory=list)
-    estimates: list[Estimate] = field(default_factory=list)
-    find_ns: int = 0
-    filter_ns: int = 0
-
-    def stages(self, wait_ns: int, took_ns: int) -> dict[str, int]:
-        """Return what each stage took of a round's time [ns]; what is neither `find` nor `filter` is `track`."""
-        rest_ns = took_ns - self.find_ns - self.filter_ns
-        return {"wait": wait_ns, "find": self.find_ns, "filter": self.filter_ns, "track": rest_ns}
 
 
 class Tracker:
@@ -82,6 +61,7 @@ class Tracker:
         self._intake = Intake(rig)
         self._rounds = Rounds(len(rig.cameras), tuning.sync_window_ns)
         self._eyes = Eyes(rig)
+        self._study = Study(rig, tuning, self._eyes, stopwatch)
         self._history = History()
         self._whole: dict[int, tuple[Frame, list[list[Blob]]]] = {}
         self._track = TrackState.SEARCHING
@@ -93,7 +73,7 @@ class Tracker:
 
     def step(self, event: Event) -> Step:
         """Take one event of the source and return what came of it."""
-        harvest = _Harvest()
+        harvest = Harvest()
         if isinstance(event, Frame) and 0 <= event.camera < len(self._rig.cameras):
             offset_ns = self._rig.cameras[event.camera].clock_offset_ns
             event = replace(event, t_ns=event.t_ns + offset_ns) if offset_ns else event
@@ -113,15 +93,15 @@ class Tracker:
 
     def finish(self) -> Step:
         """Work off the round that was still open when the frames ended."""
-        harvest = _Harvest()
+        harvest = Harvest()
         for frames in self._rounds.rest():
             self._take_round(frames, harvest)
         return self._step(harvest)
 
-    def _step(self, harvest: _Harvest) -> Step:
+    def _step(self, harvest: Harvest) -> Step:
         return Step(self._track, tuple(harvest.sightings), tuple(harvest.rejections), tuple(harvest.estimates))
 
-    def _take_round(self, frames: Round, harvest: _Harvest) -> None:
+    def _take_round(self, frames: Round, harvest: Harvest) -> None:
         """Follow the track through a round, or look for the marker in it, and say where it is."""
         started_ns = self._stopwatch()
         harvest.find_ns = harvest.filter_ns = 0
@@ -145,14 +125,14 @@ class Tracker:
         self._continuity.went_out(found.state)
         harvest.estimates.append(self._estimate(found, available_ns, stages))
 
-    def _follow(self, frames: Round, t_ns: int, harvest: _Harvest) -> Update | None:
+    def _follow(self, frames: Round, t_ns: int, harvest: Harvest) -> Update | None:
         """Update the track with a round; a late one is put in where it belongs and what came after is done again."""
         later = self._history.back_to(t_ns)
-        result = self._study(frames, self._ahead(t_ns, self._cadence.breaks(frames)), harvest)
+        result = self._study(frames, self._ahead(t_ns, self._cadence.breaks(frames)), harvest, self._history.newest)
         if result is not None:
             self._history.remember(result)
         for past in later:
-            again = self._update(self._ahead(past.t_ns), past.sightings)
+            again = self._study.update(self._ahead(past.t_ns), past.sightings)
             if isinstance(again, Update):
                 self._history.remember(again)
                 result = again
@@ -168,61 +148,7 @@ class Tracker:
             raise ValueError("nothing is tracked yet")
         return predict(newest.with_clocks_open(clock_breaks) if clock_breaks else newest, t_ns, self._tuning.process)
 
-    def _see(self, frames: Round, ahead: Prediction, harvest: _Harvest, *, start: bool = False) -> Update | None:
-        """Look where a predicted state expects the balls and update it, or return None.
-
-        start: the state is a first guess, which every ball must bear out.
-        """
-        found, look = self._glance(frames, ahead, ahead.state, harvest, start=start)
-        if isinstance(found, Update) and not start and self._eyes.blind(ahead.state):
-            # Only now is known how fast the balls move, and so how their images are smeared: look again.
-            again, sharper = self._glance(frames, ahead, found.state, harvest, start=start)
-            found, look = (again, sharper) if isinstance(again, Update) else (found, look)
-        harvest.rejections += look.rejections
-        if isinstance(found, Rejected):
-            harvest.rejections.append(found)
-            return None
-        harvest.sightings += found.used
-        harvest.rejections += found.rejected
-        blindly = self._eyes.blind(found.state)
-        used = {(sighting.camera, sighting.ball) for sighting in found.used}
-        fitted = [one for one in look.fitted if (one.sighting.camera, one.sighting.ball) in used]
-        self._eyes.learn(fitted, blindly=blindly)
-        return found
-
-    def _glance(
-        self, frames: Round, ahead: Prediction, expected: State, harvest: _Harvest, *, start: bool
-    ) -> tuple[Update | Rejected, Look]:
-        """Look where a state expects the balls, and update the prediction by them."""
-        started_ns = self._stopwatch()
-        look = self._eyes.look(frames, expected)
-        looked_ns = self._stopwatch()
-        found = self._update(
-            ahead, doubted_alone([one.sighting for one in look.fitted], None if start else self._history.newest)
-        )
-        harvest.find_ns += looked_ns - started_ns
-        harvest.filter_ns += self._stopwatch() - looked_ns
-        if isinstance(found, Update) and start and not self._all_seen_twice(found):
-            found = Rejected(Reason.GEOMETRY, "not every ball fits in two cameras", ahead.state.t_ns)
-        return found, look
-
-    def _study(self, frames: Round, ahead: Prediction, harvest: _Harvest, *, start: bool = False) -> Update | None:
-        """See, and go over the same images again as long as it is hardly known how balls look."""
-        found = self._see(frames, ahead, harvest, start=start)
-        for _ in range(self._eyes.lessons_due if found is not None else 0):
-            found = self._see(frames, ahead, _Harvest(), start=start) or found
-        return found
-
-    def _update(self, ahead: Prediction, sightings: tuple[BallSighting, ...]) -> Update | Rejected:
-        """Update a predicted state, unless it comes to lean as no vehicle does."""
-        result = update(ahead, sightings, self._rig, self._tuning.gate_probability)
-        if isinstance(result, Update) and (tilt := _tilt_rad(result.state)) > self._tuning.tilt_limit_rad:
-            limit_deg = math.degrees(self._tuning.tilt_limit_rad)
-            detail = f"the pose leans {math.degrees(tilt):.0f} deg, limit {limit_deg:.0f} deg: mirrored or mistaken"
-            return Rejected(Reason.GEOMETRY, detail, ahead.state.t_ns)
-        return result
-
-    def _search(self, frames: Round, t_ns: int, harvest: _Harvest) -> Update | None:
+    def _search(self, frames: Round, t_ns: int, harvest: Harvest) -> Update | None:
         """Look for the marker in whole frames, this round's and the other cameras' newest; start the track on it."""
         gains = self._eyes.gains
         for frame in frames:
@@ -252,19 +178,19 @@ class Tracker:
         self._lights_tried += 1
         self._eyes.suppose(others)
         seen = {camera: (frame, self._look_everywhere(frame, others)) for camera, (frame, _) in fresh.items()}
-        found = self._start(seen, _Harvest())
+        found = self._start(seen, Harvest())
         if found is None:
             self._eyes.suppose(gains)
         return found
 
-    def _start(self, seen: Seen, harvest: _Harvest) -> Update | None:
+    def _start(self, seen: Seen, harvest: Harvest) -> Update | None:
         """Start on the marker among blobs, if every ball's image bears it out."""
         start = first_state(seen, self._rig, self._tuning.process)
         if isinstance(start, Rejected):
             harvest.rejections.append(start)
             return None
         guess = first_guess(self._still_known(start), self._tuning.process)
-        return self._study(tuple(frame for frame, _ in seen.values()), guess, harvest, start=True)
+        return self._study(tuple(frame for frame, _ in seen.values()), guess, harvest, None)
 
     def _carried_by_one(self, found: Update) -> bool:
         """Say whether for a while no more than one ball was seen: what seems another is then soon a mistake."""
@@ -272,11 +198,6 @@ class Tracker:
             self._seen_ns[sighting.ball] = max(self._seen_ns[sighting.ball], sighting.t_ns)
         newest_ns = max(self._seen_ns)
         return sum(newest_ns - seen_ns <= ALONE_NS for seen_ns in self._seen_ns) < 2
-
-    def _all_seen_twice(self, found: Update) -> bool:
-        """Say whether a start is borne out by every ball in two cameras: less fits many places."""
-        cameras = [{s.camera for s in found.used if s.ball == ball} for ball in range(len(self._rig.marker))]
-        return all(len(seen) >= 2 for seen in cameras)
 
     def _still_known(self, start: State) -> State:
         """Return a first guess with what the last track learned of the cameras: their noise and their clocks."""
@@ -313,11 +234,6 @@ class Tracker:
             available_ns=available_ns,
             stages_ns=MappingProxyType(stages),
         )
-
-
-def _tilt_rad(state: State) -> float:
-    """Return the angle between the body's z and the room's [rad]."""
-    return math.acos(max(-1.0, min(1.0, float(state.R_BtoW[2, 2]))))
 
 
 def _late(frame: Frame) -> Rejected:
