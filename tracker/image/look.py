@@ -108,6 +108,7 @@ def _balls_of(
 ) -> Iterator[Fitted | Rejected]:
     """Yield each ball of the marker as seen near its prediction, or why it is not."""
     rows = expected_views(state, rig, frame.camera, frame.t_ns)
+    camera = rig.cameras[frame.camera]
     known, fits = known_of(appearance.response), np.empty((len(rows), SIZE))
     fixed = fits.view()
     fixed.flags.writeable = False
@@ -122,7 +123,8 @@ def _balls_of(
             yield Rejected(failed, detail, frame.t_ns, frame.camera)
         else:
             fit = fixed[b]
-            sighting = BallSighting(frame.camera, b, frame.t_ns, fit[UV], fit[COV].reshape(2, 2))
+            t_ns = frame.t_ns + round(camera.delay_ns(fit[UV][1]))
+            sighting = BallSighting(frame.camera, b, t_ns, fit[UV], fit[COV].reshape(2, 2))
             yield Fitted(sighting, frame, view, fit, appearance, drawn)
 
 
