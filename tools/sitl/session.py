@@ -172,13 +172,14 @@ def _run(
     console: Console,
     stack: ExitStack,
 ) -> tuple[_Witness, Outlets]:
-    """Run the loop until the plan is done."""
+    """Run the loop until the plan is done; the one link is the relay's, in place of those the config names."""
+    settings = settings.with_links((f"udpout:127.0.0.1:{relay.bridge_port}",))
     rig = rig_of(settings, None).rig
     timing = SimTiming(_RATE_HZ, _LONGEST_S, START_NS, delay_ns=1_000_000 * _CAMERA_DELAY_MS)
     source = stack.enter_context(SimSource(rig, world, clocks.stopwatch, timing, troubles=faults.troubles))
     witness = _Witness(tracker_of(settings, rig, clocks), world, faults)
     outlet = open_outlet(
-        terms_of(settings.with_links((f"udpout:127.0.0.1:{relay.bridge_port}",)), logged=True),
+        terms_of(settings, logged=True),
         component_id=settings.mavlink.component_id,
         room_yaw_deg=settings.room.room_yaw_deg,
         stopwatch=clocks.stopwatch,
