@@ -48,17 +48,20 @@ Standing = Mapping[tuple[str, str], Watch]
 
 NOTHING: Standing = MappingProxyType({})
 _CALM = Watch()
+_WELL = Finding("", Verdict.GOOD, "", "")  # of a subject that its rule does not mention
 
 
 def advance(standing: Standing, now: Readings) -> Standing:
     """Judge new readings and return how the alarms stand after them."""
     watches: dict[tuple[str, str], Watch] = {}
     for rule in RULES:
-        for finding in rule.judge(now):
-            key = (rule.name, finding.subject)
-            watch = _after(standing.get(key, _CALM), finding, rule, now.t_ns)
+        found = {finding.subject: finding for finding in rule.judge(now)}
+        stood = [subject for name, subject in standing if name == rule.name]
+        for subject in dict.fromkeys((*found, *stood)):
+            finding = found.get(subject, _WELL)
+            watch = _after(standing.get((rule.name, subject), _CALM), finding, rule, now.t_ns)
             if watch is not _CALM:
-                watches[key] = watch
+                watches[rule.name, subject] = watch
     return watches
 
 
