@@ -13,7 +13,7 @@ from scipy.stats import chi2, norm
 from bridge.settings import load_settings, rig_of
 from tools.request import Clocks
 from tools.session import tracker_of
-from tracker import so3
+from tracker.maths import so3
 from tracker.rig import Rig
 from tracker.scene import Look
 from tracker.sources.paths import ScriptedPath, scripted_path
@@ -134,10 +134,14 @@ def fly(trial: Trial, troubles: Troubles | None = None, spoil: Spoil | None = No
     """
     settings = load_settings(trial.config)
     rig = trial.rig or rig_of(settings, None).rig
-    tracker = tracker_of(settings, rig, _CLOCKS)
     events = footage(trial, rig, troubles)
-    passed = spoil(list(events)) if spoil else events
-    steps = [*(tracker.step(event) for event in passed), tracker.finish()]
+    return tracked(trial, rig, spoil(list(events)) if spoil else events)
+
+
+def tracked(trial: Trial, rig: Rig, events: Iterable[Event]) -> Flown:
+    """Track what a trial's cameras gave, with a rig as the tracker is told of it, and compare with the truth."""
+    tracker = tracker_of(load_settings(trial.config), rig, _CLOCKS)
+    steps = [*(tracker.step(event) for event in events), tracker.finish()]
     return compared(steps, trial.vehicle())
 
 
