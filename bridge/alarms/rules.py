@@ -60,7 +60,8 @@ def _gap_severe(now: Readings) -> Iterator[Finding]:
     yield Finding(
         "",
         above(now.gap_ms, GAP_SEVERE_MS, GAP_SEVERE_MS),
-        f"a gap of {now.gap_ms or 0:.0f} ms between poses; ArduPilot gives vision up after {GAP_SEVERE_MS:.0f} ms",
+        f"a gap of {now.gap_ms or 0:.0f} ms between poses; "
+        f"ArduPilot gives vision up after {GAP_SEVERE_MS:.0f} ms, PX4 after 400 ms",
         "find what covers the balls, stops a camera or holds this computer up",
     )
 
