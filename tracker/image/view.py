@@ -116,11 +116,16 @@ def _reach_m(rig: Rig) -> float:
     return float(np.linalg.norm(points - points.mean(axis=0), axis=1).max())
 
 
-def unknown_streak_px(state: State, rig: Rig, exposures_s: list[float]) -> float:
+@lru_cache(maxsize=64)
+def _seconds_by_px(rig: Rig, exposures_s: tuple[float, ...]) -> Array:
+    """Return each camera's exposure by its focal length [s px]."""
+    return np.array([camera.focal_px * s for camera, s in zip(rig.cameras, exposures_s, strict=True)])
+
+
+def unknown_streak_px(state: State, rig: Rig, exposures_s: tuple[float, ...]) -> float:
     """Return one sigma of how far the balls' images may be smeared that a state does not know of [px].
 
     exposures_s: of each camera.
     """
-    scaled = [camera.focal_px * s for camera, s in zip(rig.cameras, exposures_s, strict=True)]
     x, y, z = state.p_BinW.tolist()
-    return _smear((x, y, z), state.P, camera_table(rig), np.array(scaled), _reach_m(rig))
+    return _smear((x, y, z), state.P, camera_table(rig), _seconds_by_px(rig, exposures_s), _reach_m(rig))
