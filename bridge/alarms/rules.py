@@ -65,7 +65,8 @@ def _gap_severe(now: Readings) -> Iterator[Finding]:
         yield Finding(
             "",
             verdict,
-            f"a gap of {now.gap_ms or 0:.0f} ms between poses; ArduPilot gives vision up after {GAP_SEVERE_MS:.0f} ms",
+            f"a gap of {now.gap_ms or 0:.0f} ms between poses; "
+            f"ArduPilot gives vision up after {GAP_SEVERE_MS:.0f} ms, PX4 after 400 ms",
             "find what covers the balls, stops a camera or holds this computer up",
         )
 

@@ -33,6 +33,10 @@ from tracker.types import Step
 
 WITH_VELOCITY = ("VISION_SPEED_ESTIMATE", "ODOMETRY")
 FRAMES = "Frames"
+BY_ARRIVAL = (
+    "PX4 goes by the stamps once its TIMESYNC has had 500 answers, ten a second. Until then each pose counts as of its "
+    "arrival, later by all of this: give the bridge a minute on the link before take-off."
+)
 _COMMAND_CHECKS, _ACCEPTED = 401, 0
 _WOULD_ARM = 0x1000_0000  # MAV_SYS_STATUS_PREARM_CHECK
 
@@ -153,7 +157,8 @@ class Preflight:
         budget = self.budget(window_ns)
         known = {} if self.parameters is None else self.parameters.known
         lines = delay_lines(budget, peer.autopilot, far.sync, self.wiggle, self._lag_s(), known)
-        yield Section("Delay", tuple(lines), () if budget is None else tuple(budget.rows()))
+        notes = (*(() if budget is None else budget.rows()), *((BY_ARRIVAL,) if far.by_arrival else ()))
+        yield Section("Delay", tuple(lines), notes)
 
     def _said(self, since_ns: int) -> Section:
         asked_ns = self._asked_checks_ns

@@ -183,9 +183,10 @@ class LogSettings(Section):
 
 
 class LinkSettings(Section):
-    """One way to an autopilot, and what goes over it at every estimate: the profile's messages unless it names some."""
+    """One way to an autopilot, and what goes over it: the profile's messages and the streams of all, unless it says."""
 
     uri: Name
+    streams_hz: Annotated[float, Strict(), Field(ge=0, le=400)] | None = None
     messages: Annotated[tuple[MessageName, ...], Field(min_length=1)] | None = None
 
     @model_validator(mode="after")

@@ -27,6 +27,8 @@ PARAMETERS = "vision.parm"
 BRIDGE_PORT_ABOVE = 2
 """ArduPilot's SERIAL1 listens two ports above SERIAL0."""
 
+LAST_PORT = 65_535
+
 _TCP = re.compile(r"tcp:([^:]+):(\d{1,5})")
 
 
@@ -102,8 +104,9 @@ def running(uri: str, folder: Path, given: Conditions, radio: Radio) -> Aboard:
         OperatorError: a URI of another form, nobody there, or a physics port that is taken.
     """
     form = _TCP.fullmatch(uri)
-    if form is None:
-        raise OperatorError(f"--connect {uri}: must be tcp:HOST:PORT, SERIAL0 of an ArduPilot SITL")
+    if form is None or not 0 < int(form[2]) <= LAST_PORT - BRIDGE_PORT_ABOVE:
+        most = LAST_PORT - BRIDGE_PORT_ABOVE
+        raise OperatorError(f"--connect {uri}: must be tcp:HOST:PORT, PORT 1 to {most}, SERIAL0 of an ArduPilot SITL")
     (folder / PARAMETERS).write_text(parameter_file(given.delay_ms, {}), encoding="utf-8")
     host, port = form[1], int(form[2])
     with ExitStack() as opened:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tools.sitl.aboard import Conditions, close, simulated
+from tools.sitl.aboard import Conditions, close, running, simulated
 from tools.sitl.flight import FlightError
 from tools.sitl.held import hold
 from tools.sitl.late import LateWire
@@ -55,6 +55,13 @@ def test_a_port_that_never_opens_is_told_in_one_line(closed_port: socket.socket)
     wire = LateWire(*closed_port.getsockname())
     with pytest.raises(OperatorError, match=r"SERIAL1 did not open at tcp:127\.0\.0\.1:\d+ within 20 s of its clock"):
         asked(wire, 20_000)
+
+
+@pytest.mark.parametrize("uri", ["udp:127.0.0.1:5760", "tcp:127.0.0.1", "tcp:127.0.0.1:0", "tcp:127.0.0.1:65534"])
+def test_an_address_of_another_form_is_told_in_one_line(uri: str, tmp_path: Path) -> None:
+    given = Conditions(0.0, (47.0, 8.0, 400.0), 30, START_NS)
+    with pytest.raises(OperatorError, match=rf"--connect {uri}: must be tcp:HOST:PORT, PORT 1 to 65533"):
+        running(uri, tmp_path, given, tuple)
 
 
 def test_a_simulator_whose_clock_runs_already_is_refused() -> None:
