@@ -106,6 +106,7 @@ def _find_balls(
 ) -> None:
     """Add each ball of the marker as seen in one image near its prediction, or why it is not."""
     image, camera, t_ns, balls = frame.image, frame.camera, frame.t_ns, rig.marker.balls
+    eye = rig.cameras[camera]
     rows, known, colours = (
         expected_views(state, rig, camera, t_ns), known_of(appearance.response), colours_of_each(balls, gains)
     )  # fmt: skip
@@ -120,7 +121,8 @@ def _find_balls(
         drawn = album.serve(b, view, appearance)
         failed = find_ball(image, colours[b], rows[b], known, drawn, fits[b])
         if failed is None:
-            sighting = BallSighting(camera, b, t_ns, uvs_px[b], covs_px2[b])
+            row_ns = t_ns + round(eye.delay_ns(fits[b, UV][1])) if eye.readout_ns else t_ns
+            sighting = BallSighting(camera, b, row_ns, uvs_px[b], covs_px2[b])
             look.fitted.append(Fitted(sighting, frame, view, fixed[b], appearance, drawn))
         else:
             detail = f"no {balls[b].name} at ({view[U]:.0f}, {view[V]:.0f}) px, where it is expected"

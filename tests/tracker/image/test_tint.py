@@ -12,15 +12,15 @@ from hypothesis import strategies as st
 
 from tracker.image.tint import AROUND, LEARN_BALLS, NEUTRAL, UNITY, Bgr, Gains, Tint, core_colour
 
-PAINTS = {0: (46.0, 161.0, 166.0), 1: (52.0, 128.0, 43.0), 2: (36.0, 89.0, 165.0)}
+PAINTS = {0: np.array([46.0, 161.0, 166.0]), 1: np.array([52.0, 128.0, 43.0]), 2: np.array([36.0, 89.0, 165.0])}
 """Yellow, green, orange, BGR."""
 gain = st.floats(0.75, 1.35)
 
 
 def under(gains: Gains, brightness: float = 1.0) -> list[tuple[int, Bgr]]:
     """Return what each ball looks like in a light."""
-    lit = brightness * gains.blue, brightness, brightness * gains.red
-    return [(ball, (lit[0] * blue, lit[1] * green, lit[2] * red)) for ball, (blue, green, red) in PAINTS.items()]
+    seen = {ball: brightness * bgr * (gains.blue, 1.0, gains.red) for ball, bgr in PAINTS.items()}
+    return [(ball, (blue, green, red)) for ball, (blue, green, red) in seen.items()]
 
 
 def used_to(gains: Gains) -> Tint:
