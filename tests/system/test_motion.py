@@ -60,7 +60,7 @@ def flown(motion: str, look: str, offsets_ns: tuple[int, ...] = ()) -> Flown:
     return fly(Trial(MOTIONS[motion], SimTiming(15.0, 4.0, offsets_ns=offsets_ns), LOOKS[look], seed=2))
 
 
-OPEN = [("all at once", "8 ms, gamma 1.0"), ("all at once", "8 ms, gamma 2.2")]
+OPEN = [("all at once", "8 ms, gamma 2.2")]
 """Not reached yet, see docs/ROADMAP.md."""
 each_speed = pytest.mark.parametrize("motion", [motion for motion in MOTIONS if motion != "all at once"])
 each_look = pytest.mark.parametrize("look", LOOKS)
@@ -78,6 +78,12 @@ def test_at_top_speed_the_mean_error_is_half_a_millimetre_and_a_quarter_degree(m
 @each_look
 def test_at_top_speed_no_pose_is_wrong(motion: str, look: str) -> None:
     assert flown(motion, look).wrong() == {}
+
+
+@pytest.mark.parametrize("look", ["4 ms, gamma 1.0", "4 ms, gamma 2.2"])
+def test_no_pose_is_wrong_with_all_motions_at_once(look: str) -> None:
+    """At 8 ms some still are, see docs/ROADMAP.md."""
+    assert flown("all at once", look).wrong() == {}
 
 
 @each_speed
