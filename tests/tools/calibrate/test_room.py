@@ -1,0 +1,91 @@
+"""The cameras' places from the waved marker, against the truth of a simulation and the laws of the parts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.tools.calibrate.waved import footage_of, misplaced
+from tests.tracker.paper_rig import paper_rig
+from tests.tracker.rigs import TUNING, ring_rig
+from tools.calibrate.bundle import stepped
+from tools.calibrate.footage import watch
+from tools.calibrate.gauge import aligned
+from tools.calibrate.jacobian import Layout, residuals, slopes
+from tools.calibrate.rigid import rigid
+from tools.calibrate.scene import Scene, Seen
+from tools.calibrate.solve import find_cameras
+from tools.calibrate.tracks import Track
+from tracker import so3
+from tracker.errors import OperatorError
+from tracker.rig import Rig, make_rig
+from tracker.scene import Look
+
+
+def _scene(rig: Rig, instants: int, rng: np.random.Generator) -> tuple[Scene, Seen]:
+    """Return a scene, and sightings of it that are a little off."""
+    R = np.stack([so3.exp(v) for v in rng.normal(scale=0.4, size=(instants, 3))])
+    p = rng.uniform(-0.4, 0.4, (instants, 3))
+    scene = Scene(rig.cameras, np.zeros(len(rig.cameras)), np.array(rig.marker.points_inB), p, R)
+    places = scene.balls_inW()
+    uv = np.stack([c.project(places.reshape(-1, 3))[0].reshape(instants, -1, 2) for c in rig.cameras])
+    seen = Seen(np.arange(float(instants)), scene.offsets_s, uv + rng.normal(size=uv.shape), 50.0 * uv / uv.max())
+    return scene, seen
+
+
+@pytest.mark.parametrize("seed", [1, 5])
+def test_two_misplaced_cameras_are_found_again_and_so_is_the_clock_between_them(seed: int) -> None:
+    true, rng = paper_rig(), np.random.default_rng(seed)
+    said = make_rig(tuple(misplaced(camera, rng) for camera in true.cameras), true.marker)
+    found = find_cameras(watch(footage_of(true, seed, Look(), 14.0, (0, 8_000_000)), said, 60.0), said, TUNING)
+    assert abs(found.cameras[1].clock_offset_ns - 8_000_000) < 500_000
+    for camera, truth in zip(aligned(found.adjusted.scene, true.cameras).cameras, true.cameras, strict=True):
+        assert np.linalg.norm(camera.p_CinW - truth.p_CinW) < 0.002
+        assert np.linalg.norm(so3.log(truth.R_CtoW.T @ camera.R_CtoW)) < math.radians(0.05)
+
+
+def test_a_camera_that_shares_too_little_is_named() -> None:
+    rig = paper_rig()
+    with pytest.raises(OperatorError, match="cam1 saw all balls together with another camera in 0 instants"):
+        find_cameras(watch(iter(()), rig, 1.0), rig, TUNING)
+
+
+def test_the_jacobian_is_the_slope_of_the_residuals() -> None:
+    scene, seen = _scene(ring_rig(3), 4, np.random.default_rng(1))
+    seen.uv_px[1, 2] = np.nan
+    layout = Layout(3, 3, 4, focal=True, marker=True)
+    J = slopes(scene, seen, layout)
+    for k in range(layout.size):
+        step = np.zeros(layout.size)
+        step[k] = 1e-6
+        ahead, behind = (residuals(stepped(scene, s, layout), seen) for s in (step, -step))
+        np.testing.assert_allclose(J[:, [k]].toarray()[:, 0], (ahead - behind) / 2e-6, rtol=1e-5, atol=1e-3)
+
+
+def test_a_rigid_motion_is_found_and_a_mirror_never() -> None:
+    rng = np.random.default_rng(2)
+    points, R, p = rng.normal(size=(5, 4, 3)), so3.exp(np.array([0.3, -1.0, 2.0])), np.array([1.0, 2.0, 3.0])
+    found_R, found_p = rigid(points, points @ R.T + p)
+    np.testing.assert_allclose(found_R, np.broadcast_to(R, found_R.shape), atol=1e-12)
+    np.testing.assert_allclose(found_p, np.broadcast_to(p, found_p.shape), atol=1e-12)
+    assert np.linalg.det(rigid(points, points * [1.0, 1.0, -1.0])[0]) == pytest.approx(1.0)
+
+
+def test_between_frames_a_cubic_is_met_exactly_and_over_a_gap_nothing_is_said() -> None:
+    t_s = np.array([0.0, 0.1, 0.2, 0.3, 0.4, 0.7, 0.8, 0.9, 1.0])
+    track = Track(t_s, np.stack([t_s**3, 2.0 * t_s], axis=1)[:, None, :])
+    uv, speed = track.at(np.array([0.15, 0.2, 0.55, 0.85, 0.97]))
+    np.testing.assert_allclose(uv[[0, 1, 3], 0, 0], np.array([0.15, 0.2, 0.85]) ** 3, atol=1e-12)
+    np.testing.assert_allclose(speed[[0, 1, 3], 0], [[3 * t * t, 2.0] for t in (0.15, 0.2, 0.85)], atol=1e-10)
+    assert np.isnan(uv[[2, 4]]).all()
+
+
+def test_a_scene_is_aligned_as_a_whole() -> None:
+    scene, _ = _scene(ring_rig(4), 3, np.random.default_rng(3))
+    R, p = so3.exp(np.array([0.1, 2.0, -0.4])), np.array([3.0, -1.0, 0.5])
+    away = tuple(replace(c, R_CtoW=R @ c.R_CtoW, p_CinW=R @ c.p_CinW + p) for c in scene.cameras)
+    moved = aligned(scene, away)
+    np.testing.assert_allclose(moved.balls_inW(), scene.balls_inW() @ R.T + p, atol=1e-12)
