@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tools.calibrate.bundle import Adjusted, adjust
-from tools.calibrate.footage import Footage, looked_again
-from tools.calibrate.gauge import aligned
-from tools.calibrate.jacobian import Layout
-from tools.calibrate.scene import Seen, common_instants, seen_at
-from tools.calibrate.start import first_scene, marker_way
-from tools.calibrate.tracks import Track
+from tools.calibrate.room.bundle import Adjusted, adjust
+from tools.calibrate.room.footage import Footage, looked_again
+from tools.calibrate.room.gauge import aligned
+from tools.calibrate.room.jacobian import Layout
+from tools.calibrate.room.scene import Seen, common_instants, seen_at
+from tools.calibrate.room.start import first_scene, marker_way
+from tools.calibrate.room.tracks import Track
 from tracker.camera import Camera
 from tracker.rig import Rig, make_rig
 from tracker.tuning import Tuning

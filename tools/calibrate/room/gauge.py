@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from tools.calibrate.rigid import rigid
-from tools.calibrate.scene import Scene
-from tools.calibrate.start import placed
+from tools.calibrate.room.rigid import rigid
+from tools.calibrate.room.scene import Scene
+from tools.calibrate.room.start import placed
 from tracker.camera import Camera
 from tracker.types import Array
 

@@ -14,9 +14,9 @@ from scipy.sparse import csc_array, diags_array
 from scipy.sparse.linalg import splu
 from scipy.spatial.transform import Rotation
 
-from tools.calibrate.jacobian import Layout, residuals, slopes
-from tools.calibrate.scene import Scene, Seen
-from tools.calibrate.start import placed
+from tools.calibrate.room.jacobian import Layout, residuals, slopes
+from tools.calibrate.room.scene import Scene, Seen
+from tools.calibrate.room.start import placed
 from tracker.camera import Camera
 from tracker.types import Array, frozen_array
 

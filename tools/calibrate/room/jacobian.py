@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse import csr_array
 
-from tools.calibrate.scene import Indices, Scene, Seen
+from tools.calibrate.room.scene import Indices, Scene, Seen
 from tracker.types import Array
 
 POSE, CAMERA = 6, 7

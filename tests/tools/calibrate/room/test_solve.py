@@ -8,17 +8,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.tools.calibrate.waved import footage_of, misplaced
+from tests.tools.calibrate.room.waved import footage_of, misplaced
 from tests.tracker.paper_rig import paper_rig
 from tests.tracker.rigs import TUNING, ring_rig
-from tools.calibrate.bundle import stepped
-from tools.calibrate.footage import watch
-from tools.calibrate.gauge import aligned
-from tools.calibrate.jacobian import Layout, residuals, slopes
-from tools.calibrate.rigid import rigid
-from tools.calibrate.scene import Scene, Seen
-from tools.calibrate.solve import find_cameras
-from tools.calibrate.tracks import Track
+from tools.calibrate.room.bundle import stepped
+from tools.calibrate.room.footage import watch
+from tools.calibrate.room.gauge import aligned
+from tools.calibrate.room.jacobian import Layout, residuals, slopes
+from tools.calibrate.room.rigid import rigid
+from tools.calibrate.room.scene import Scene, Seen
+from tools.calibrate.room.solve import find_cameras
+from tools.calibrate.room.tracks import Track
 from tracker import so3
 from tracker.errors import OperatorError
 from tracker.rig import Rig, make_rig

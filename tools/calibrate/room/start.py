@@ -12,8 +12,8 @@ from itertools import combinations
 import cv2
 import numpy as np
 
-from tools.calibrate.rigid import rigid
-from tools.calibrate.scene import Scene, Seen
+from tools.calibrate.room.rigid import rigid
+from tools.calibrate.room.scene import Scene, Seen
 from tracker.camera import Camera
 from tracker.errors import OperatorError
 from tracker.rig import Rig

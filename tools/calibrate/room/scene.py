@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tools.calibrate.tracks import Track
+from tools.calibrate.room.tracks import Track
 from tracker.camera import Camera
 from tracker.types import Array
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tools.calibrate.balls import find_balls
-from tools.calibrate.tracks import Track, track_of
+from tools.calibrate.room.balls import find_balls
+from tools.calibrate.room.tracks import Track, track_of
 from tracker.pipeline import Tracker
 from tracker.rig import Rig
 from tracker.tuning import Tuning
