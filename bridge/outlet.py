@@ -7,9 +7,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 
 from bridge.clock import Nanoseconds
+from bridge.dialect import Encoder, Identity
 from bridge.dialogue import Dialogue, DialogueState, Ear, Terms
 from bridge.links import Link, open_link
-from bridge.pack import MESSAGES, Encoder, Identity, Packer
+from bridge.pack import MESSAGES, Packer
 from bridge.signing import Seal, Signing
 from bridge.wire import LinkState, Message, Received, Sent
 from tracker.errors import OperatorError
@@ -148,7 +149,7 @@ def open_outlet(
 
     Args:
         links: URIs (forms: `bridge.links.FORMS`), each with the terms of its talk.
-        component_id: who speaks, see `bridge.pack.Identity`; the system id is the vehicle's.
+        component_id: who speaks, see `bridge.dialect.Identity`; the system id is the vehicle's.
         room_yaw_deg: heading of the room's x axis, clockwise from north [deg].
         stopwatch: reads a running time [ns].
         seal: signs what goes out and is asked of what comes in; the outlet then owns it.  None for neither.

@@ -9,6 +9,11 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import pytest
+from hypothesis import settings
+
+# How long an example takes is the machine's affair, not the property's.
+settings.register_profile("untimed", deadline=None)
+settings.load_profile("untimed")
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 
@@ -30,6 +35,15 @@ def shared() -> Path:
     if not (folder / "recordings").is_dir():
         missing = f"no recordings in {folder}: set POSEBRIDGE_SHARED to the folder that holds `recordings`"
         _lacking(missing)
+    return folder
+
+
+@pytest.fixture(scope="session")
+def chessboard_pairs(shared: Path) -> Path:
+    """Return the folder of real stereo chessboard pairs; lacking, it fails in CI and skips on a user's machine."""
+    folder = shared / "chessboard-stereo"
+    if not folder.is_dir():
+        _lacking(f"no chessboard pairs in {folder}")
     return folder
 
 

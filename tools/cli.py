@@ -13,8 +13,9 @@ from typing import Annotated
 
 import typer
 
-from tools.commands import fly, identify, logs, prepare
+from tools.commands import fly, identify, logs, place, prepare
 from tools.commands.bench import bench
+from tools.commands.calibrate import calibrate
 from tools.commands.common import RealClocks
 from tools.request import Clocks, CpuClocks
 from tracker.errors import OperatorError
@@ -25,12 +26,13 @@ ONE_THREAD_EACH = ("OPENCV_FOR_THREADS_NUM", "OPENBLAS_NUM_THREADS", "OMP_NUM_TH
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
 _COMMANDS = (
-    fly.run, fly.demo, logs.replay, logs.compare, logs.export, logs.monitor,
-    prepare.key, prepare.colours, fly.sitl, prepare.check, identify.excite, identify.sysid,
+    fly.run, fly.demo, logs.replay, logs.compare, logs.export, logs.monitor, prepare.key, prepare.colours, place.place,
+    fly.sitl, prepare.check, identify.excite, identify.sysid,
 )  # fmt: skip
 for command in _COMMANDS:
     app.command()(command)
 app.add_typer(bench, name="bench")
+app.add_typer(calibrate, name="calibrate")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -67,7 +67,7 @@ def _open_cameras(uri: SourceUri, settings: Settings, clocks: Clocks) -> OpenedS
     chosen = rig_of(settings, None, len(addresses))
     named = {camera.name: camera for camera in settings.rig.cameras}
     cameras = tuple(
-        _live_camera(address, camera.name, (camera.width_px, camera.height_px), named.get(camera.name))
+        live_camera(address, camera.name, (camera.width_px, camera.height_px), named.get(camera.name))
         for address, camera in zip(addresses, chosen.rig.cameras, strict=True)
     )
     source = LiveSource(cameras, clocks.monotonic, clocks.stopwatch)
@@ -93,7 +93,7 @@ def _doubts(chosen: ChosenRig) -> tuple[str, ...]:
     return ("the cameras are not calibrated: the config's nominal ones do for a look, not for flight",)
 
 
-def _live_camera(address: str, name: str, size_px: tuple[int, int], settings: CameraSettings | None) -> LiveCamera:
+def live_camera(address: str, name: str, size_px: tuple[int, int], settings: CameraSettings | None) -> LiveCamera:
     """Describe a camera: its size by its calibration, the rest by the config's camera of the same name, if any."""
     width_px, height_px = size_px
     if settings is None:

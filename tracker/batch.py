@@ -12,6 +12,7 @@ from tracker.manoeuvre import variances
 from tracker.measure import Indices, camera_table, marker_points, pixels
 from tracker.predict import Prediction
 from tracker.rig import Rig
+from tracker.sag import sag_noise
 from tracker.singer import process_noise
 from tracker.state import OFFSETS
 from tracker.types import Array, BallSighting
@@ -70,9 +71,12 @@ def make_batch(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig)
     lags_s = np.array([s.t_ns - state.t_ns for s in sightings]) * 1e-9
     z = np.concatenate([s.uv_px for s in sightings])
     covs_px = np.concatenate([s.cov_px for s in sightings])
-    h, H = pixels(state.mean, T, cameras, balls, lags_s, camera_table(rig), marker_points(rig))
+    points_inB = marker_points(rig) - ahead.pivot_inB
+    h, H = pixels(state.mean, T, cameras, balls, lags_s, camera_table(rig), points_inB)
     true_lags_s = lags_s + state.offsets_s[cameras]
     R, A, B, path, doubt = _covariances(H, ahead.P_coasted, ahead.dt, T, covs_px, state.noise, cameras, true_lags_s)
+    if ahead.pivot_inB.any():
+        A += sag_noise(H, balls, points_inB, state.mean, state.P)
     return Batch(sightings, z, R, cameras, balls, lags_s, z - h, A, B, path, doubt, variances(ahead.process)[:, -1])
 
 

@@ -138,7 +138,11 @@ def log_likelihoods(y: Array, A: Array, B: Array, variances: Array, means: tuple
 
 @compiled("f8[::1](f8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")
 def moved(mean: Array, dx: Array, E: Array, J_r: Array) -> Array:
-    """Return the mean with the error dx put in, and write exp and right Jacobian of its turn into E and J_r."""
+    """Return the mean with the error dx put in, and write exp and right Jacobian of its turn into E and J_r.
+
+    The body's rate and angular acceleration stay what they were as seen from the room, to all orders of the turn: they
+    become E' (w + dw + theta x w). A turn that no pixel sees must not alter how the seen balls go on.
+    """
     now = mean.copy()
     turn_into(dx[3], dx[4], dx[5], E, J_r)
     for i in range(3):
@@ -147,7 +151,35 @@ def moved(mean: Array, dx: Array, E: Array, J_r: Array) -> Array:
             now[3 + 3 * i + j] = mean[3 + 3 * i] * E[0, j] + mean[4 + 3 * i] * E[1, j] + mean[5 + 3 * i] * E[2, j]
     now[12:24] += dx[6:18]
     now[25:] += dx[18:]
+    for first in (15, 21):
+        a, b, c = mean[first], mean[first + 1], mean[first + 2]
+        x = now[first] + dx[4] * c - dx[5] * b
+        y = now[first + 1] + dx[5] * a - dx[3] * c
+        z = now[first + 2] + dx[3] * b - dx[4] * a
+        for i in range(3):
+            now[first + i] = E[0, i] * x + E[1, i] * y + E[2, i] * z
     return now
+
+
+@compiled("f8[:, ::1](f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], i8)")
+def moved_slope(mean: Array, now: Array, E: Array, J_r: Array, size: int) -> Array:
+    """Return d (error about `now`) / d dx (size, size), for the mean, E and J_r that `moved` began with and wrote.
+
+    Source: exp(theta + d) = E exp(J_r d), and w' = E' (w + dw + theta x w) goes by
+        E' d(dw) + ([w']x J_r - E' [w]x) d(theta).
+    """
+    G = np.eye(size)
+    G[3:6, 3:6] = J_r
+    for rows, first in ((9, 15), (15, 21)):
+        w, then = mean[first : first + 3], now[first : first + 3]
+        for i in range(3):
+            p, q = (i + 1) % 3, (i + 2) % 3
+            for j in range(3):
+                G[rows + i, rows + j] = E[j, i]
+                G[rows + i, 3 + j] = then[p] * J_r[q, j] - then[q] * J_r[p, j]
+                u, v = (j + 1) % 3, (j + 2) % 3
+                G[rows + i, 3 + j] -= E[u, i] * w[v] - E[v, i] * w[u]
+    return G
 
 
 @compiled("void(f8[::1], f8[:, ::1], f8[::1])")
@@ -202,15 +234,16 @@ def likeliest(
         dx (size,); innovation (2n + 2,) and H (2n + 2, size) there, for one linear update from the prior; the
         posterior's variances (size,). NaN when a ball comes to lie behind a camera.
     Source: iterated EKF, Bell and Cathey, IEEE Trans. Automatic Control 38 (1993): with H at the newest estimate and
-        dx its distance from the prior, the linear update's innovation is z - h + H dx (3). By the multiplicative
-        attitude, d/d dx = H diag(I, J_r(theta), I, ...) (4).
+        dx its distance from the prior, the linear update's innovation is z - h + H dx (3). About dx, d/d dx
+        is H G, G from `moved_slope` (4).
     """
     size, rows = len(P), len(R)
     dx, y, variances = np.zeros(size), np.zeros(rows), np.zeros(size)
     H = np.zeros((rows, size))
-    E, J_r = np.empty((3, 3)), np.empty((3, 3))
+    E, J_r, through = np.empty((3, 3)), np.empty((3, 3)), np.empty(9)
     for _ in range(MAX_ITERATIONS):
         now = moved(mean, dx, E, J_r)
+        G = moved_slope(mean, now, E, J_r, size)
         h, slope = pixels(now, T, cameras, balls, lags_s, table, points_inB)
         if not np.isfinite(h).all():
             dx[:] = math.nan
@@ -220,9 +253,16 @@ def likeliest(
         for i in range(rows - TILT_ROWS):
             y[i] = z[i] - h[i]
         for i in range(rows):
-            a, b, c = H[i, 3], H[i, 4], H[i, 5]
             for j in range(3):
-                H[i, 3 + j] = a * J_r[0, j] + b * J_r[1, j] + c * J_r[2, j]  # (4)
+                by_turn = 0.0
+                for k in range(3):
+                    by_turn += H[i, 3 + k] * G[3 + k, 3 + j] + H[i, 9 + k] * G[9 + k, 3 + j]
+                    by_turn += H[i, 15 + k] * G[15 + k, 3 + j]
+                through[j] = by_turn
+                through[3 + j] = H[i, 9] * G[9, 9 + j] + H[i, 10] * G[10, 9 + j] + H[i, 11] * G[11, 9 + j]
+                through[6 + j] = H[i, 15] * G[15, 15 + j] + H[i, 16] * G[16, 15 + j] + H[i, 17] * G[17, 15 + j]
+            for j in range(3):
+                H[i, 3 + j], H[i, 9 + j], H[i, 15 + j] = through[j], through[3 + j], through[6 + j]  # (4)
             for j in range(size):
                 y[i] += H[i, j] * dx[j]  # (3)
         new, biggest = _linear(P, H, R, y, dx, variances)

@@ -23,7 +23,7 @@ from tracker.batch import Batch, make_batch
 from tracker.fit import Fit, fit
 from tracker.gate import chi2_limit
 from tracker.posterior import settled
-from tracker.predict import Prediction
+from tracker.predict import Prediction, at_origin
 from tracker.rig import Rig
 from tracker.state import State
 from tracker.types import BallSighting, Reason, Rejected
@@ -58,6 +58,7 @@ def update(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig, pro
     """
     if not sightings:
         return Rejected(Reason.FRAME_GATE, "no sighting near the prediction", ahead.state.t_ns)
+    ahead = ahead.about_pivot()
     batch = make_batch(ahead, sightings, rig)
     distances2 = batch.distances2()
     limit = chi2_limit(probability, 2)
@@ -82,7 +83,7 @@ def update(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig, pro
     for sighting, gain in zip(batch.sightings, whole.gains() if best is not whole else (), strict=False):
         if sighting not in best.batch.sightings:
             rejected.append(_left_out(sighting, rig, float(gain), "from what the others say"))
-    state = _posterior(ahead.state, best)
+    state = at_origin(_posterior(ahead.state, best), ahead.pivot_inB)
     return Update(state, best.nis, len(best.u), best.batch.sightings, tuple(rejected))
 
 

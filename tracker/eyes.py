@@ -100,14 +100,14 @@ class Eyes:
             self._rivals[index] = self._rivals[index].learned(image, camera, one.expected(camera), one.centre)
 
     def _follow_the_light(self, fitted: Sequence[Fitted]) -> None:
-        """Learn the light of one of the cameras that see now, in turn, from the colours of the balls it sees well."""
+        """Learn the light from the balls' colours: of each camera at first, then of those that see now in turn."""
         cameras = sorted({one.frame.camera for one in fitted})
-        if not cameras:
-            return
-        camera = cameras[self._turn % len(cameras)]
-        seen = [one for one in fitted if one.frame.camera == camera and float(one.fit[MISFIT]) <= MISFIT_MAX]
-        if len(seen) >= LIGHT_BALLS:
-            self._tints[camera] = self._tints[camera].learned([(one.sighting.ball, _colour(one)) for one in seen])
+        if cameras and all(self._tints[camera].settled for camera in cameras):
+            cameras = [cameras[self._turn % len(cameras)]]
+        for camera in cameras:
+            seen = [one for one in fitted if one.frame.camera == camera and float(one.fit[MISFIT]) <= MISFIT_MAX]
+            if len(seen) >= LIGHT_BALLS:
+                self._tints[camera] = self._tints[camera].learned([(one.sighting.ball, _colour(one)) for one in seen])
 
 
 def _colour(one: Fitted) -> Array:

@@ -71,7 +71,7 @@ def fit(ahead: Prediction, batch: Batch, rig: Rig, *, adapt: bool = True) -> Fit
     tilt = 2.0 * process.tilt_rad**2 * process.tilt_s / max(ahead.dt, SHORTEST_S)
     levels, P, R, doubtful = _prepared(
         ahead.state.levels, manoeuvre.variances(process), batch.y, batch.A, batch.B, batch.R, batch.path, batch.doubt,
-        ahead.P_coasted, ahead.dt, process.manoeuvre_s, tilt, adapt,
+        ahead.P_coasted, ahead.dt, process.manoeuvre_s, tilt, adapt, bool(ahead.pivot_inB.any()),
     )  # fmt: skip
     agreed = _fitted(ahead, batch, rig, levels, P, R)
     if not doubtful:
@@ -82,18 +82,22 @@ def fit(ahead: Prediction, batch: Batch, rig: Rig, *, adapt: bool = True) -> Fit
 
 
 @compiled("Tuple((f8[:, ::1], f8[:, ::1], f8[:, ::1], b1))(f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1],"
-          " f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8, f8, f8, b1)")  # fmt: skip
+          " f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8, f8, f8, b1, b1)")  # fmt: skip
 def _prepared(
     levels: Array, of: Array, y: Array, A: Array, B: Array, R_pixels: Array, path: Array, doubt: Array,
-    P_coasted: Array, dt: float, T: float, tilt: float, adapt: bool,
+    P_coasted: Array, dt: float, T: float, tilt: float, adapt: bool, unseen: bool,
 ) -> tuple[Array, Array, Array, bool]:  # fmt: skip
     """Return levels, prior covariance, noise of pixels and tilt, and whether the doubt of the clocks matters.
 
-    tilt: variance of roll and of pitch.  The others as `Batch`, `Prediction` and `manoeuvre` name them.
+    tilt: variance of roll and of pitch.  unseen: whether a turn is open; then axes that are seen to be quiet do not
+    tell whether it is, and the level of rotation is only raised.  The others as `Batch`, `Prediction` and `manoeuvre`
+    name them.
     """
     n = len(y)
     if adapt and dt > 0.0:
-        levels = judged(levels, log_likelihoods(y, A, B, of, expected(levels, of)))
+        before, levels = levels, judged(levels, log_likelihoods(y, A, B, of, expected(levels, of)))
+        if unseen and expected(levels, of)[1] < expected(before, of)[1]:
+            levels[1] = before[1]
     translation, rotation = expected(levels, of)
     R, noise, doubts = np.zeros((n + TILT_ROWS, n + TILT_ROWS)), 0.0, 0.0
     for i in range(n):
@@ -137,7 +141,7 @@ def _fitted(ahead: Prediction, batch: Batch, rig: Rig, levels: Array, P: Array, 
 def _solve(ahead: Prediction, batch: Batch, rig: Rig, P: Array, R: Array) -> tuple[Array, Array, Array, Array]:
     return likeliest(
         ahead.state.mean, P, ahead.process.manoeuvre_s, batch.z, R, batch.cameras, batch.balls, batch.lags_s,
-        camera_table(rig), marker_points(rig),
+        camera_table(rig), marker_points(rig) - ahead.pivot_inB,
     )  # fmt: skip
 
 
@@ -145,7 +149,8 @@ def _bend(ahead: Prediction, batch: Batch, rig: Rig, dx: Array, P: Array, H: Arr
     """Return how far a turn that a fit left open bends the balls' paths from straight (2n,) [px], or None if little.
 
     Linearised, a ball off that turn's axis moves square to its arm; truly it moves on a circle, which a filter that
-    believes its tangent takes for knowledge of the arm's direction.
+    believes its tangent takes for knowledge of the arm's direction. Arms are from the pivot, so a turn about two balls
+    bends nothing; what one camera alone leaves open does.
 
     Source: turned by phi about the unit axis e, the arm m goes to second order by phi^2/2 (e (e.m) - m). For phi
         normal with variance s, E[phi^4] = 3 s^2, so the rms of that is sqrt(3)/2 s |...|, the mean counted in. s, e:
@@ -157,7 +162,7 @@ def _bend(ahead: Prediction, batch: Batch, rig: Rig, dx: Array, P: Array, H: Arr
     largest, axis = float(variances[2]), axes[:, 2]
     if largest < LEAST_OPEN_TURN_RAD**2:
         return None
-    arms = rig.marker.points_inB
+    arms = marker_points(rig) - ahead.pivot_inB
     R_BtoW = ahead.state.moved(dx).R_BtoW
     sag_inW = (arms @ np.outer(axis, axis) - arms) * (largest * np.sqrt(3.0) / 2.0) @ R_BtoW.T
     n = len(batch.z)

@@ -17,7 +17,7 @@ from tracker.compiled import compiled
 from tracker.measure import Indices
 from tracker.types import Array
 
-LEAST_PX = 0.015
+LEAST_PX = 0.01
 MEMORY = 300.0  # rounds
 PRIOR_PIXELS = 24.0  # the config's value weighs as much as so many exact pixels
 LIMIT = 9.0  # of a sighting's squared Mahalanobis distance, 2 degrees of freedom

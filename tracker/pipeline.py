@@ -9,63 +9,43 @@ It reads no clock but the stopwatch it is given, and touches no file and no devi
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 
-import numpy as np
-
-from tracker import so3
 from tracker.acquire import Seen, first_state
 from tracker.bias import shared_covariance
+from tracker.cadence import Cadence
+from tracker.continuity import Continuity
 from tracker.detect import Blob
-from tracker.ekf import Update, update
+from tracker.ekf import Update
 from tracker.eyes import Eyes
-from tracker.gate import chi2_limit
+from tracker.harvest import Harvest
 from tracker.history import History
 from tracker.intake import Intake
-from tracker.look import Look, look_everywhere
+from tracker.look import look_everywhere
 from tracker.predict import Prediction, first_guess, predict
 from tracker.rig import Rig
 from tracker.rounds import Rounds
+from tracker.sag import sag_covariance
 from tracker.state import OFFSETS, REPORTED, State
+from tracker.study import Round, Study
 from tracker.tint import Gains
 from tracker.tuning import Tuning
 from tracker.types import (
-    BallSighting,
     Estimate,
     Event,
     Frame,
     Reason,
     Rejected,
+    Silence,
     Step,
     TrackState,
     frozen_array,
 )
 
-RESETS = 256
-UNBROKEN_S, LEAST_GAP_S = 0.1, 0.033
-
-Round = tuple[Frame, ...]
-
-
-@dataclass(slots=True, eq=False)
-class _Harvest:
-    """What the rounds of one step gave so far.
-
-    find_ns, filter_ns: time that looking for balls and updating by them took, since the last estimate [ns].
-    """
-
-    sightings: list[BallSighting] = field(default_factory=list)
-    rejections: list[Rejected] = field(default_factory=list)
-    estimates: list[Estimate] = field(default_factory=list)
-    find_ns: int = 0
-    filter_ns: int = 0
-
-    def stages(self, wait_ns: int, took_ns: int) -> dict[str, int]:
-        """Return what each stage took of a round's time [ns]; what is neither `find` nor `filter` is `track`."""
-        rest_ns = took_ns - self.find_ns - self.filter_ns
-        return {"wait": wait_ns, "find": self.find_ns, "filter": self.filter_ns, "track": rest_ns}
+ALONE_NS = 100_000_000  # one ball tells a place and no attitude: longer than this it carries no track
+NO_BREAKS: Mapping[int, float] = MappingProxyType({})
 
 
 class Tracker:
@@ -81,19 +61,24 @@ class Tracker:
         self._intake = Intake(rig)
         self._rounds = Rounds(len(rig.cameras), tuning.sync_window_ns)
         self._eyes = Eyes(rig)
+        self._study = Study(rig, tuning, self._eyes, stopwatch)
         self._history = History()
         self._whole: dict[int, tuple[Frame, list[list[Blob]]]] = {}
         self._track = TrackState.SEARCHING
         self._lights_tried = 0
-        self._resets = 0
+        self._continuity = Continuity(tuning)
+        self._cadence = Cadence(len(rig.cameras))
+        self._seen_ns = [-(2**63)] * len(rig.marker)
         self._sent_ns = -(2**63)
 
     def step(self, event: Event) -> Step:
         """Take one event of the source and return what came of it."""
-        harvest = _Harvest()
+        harvest = Harvest()
         if isinstance(event, Frame) and 0 <= event.camera < len(self._rig.cameras):
             offset_ns = self._rig.cameras[event.camera].clock_offset_ns
             event = replace(event, t_ns=event.t_ns + offset_ns) if offset_ns else event
+        if isinstance(event, Silence):
+            self._intake.wait(event.t_ns)
         if isinstance(event, Rejected):
             harvest.rejections.append(event)
         else:
@@ -108,15 +93,15 @@ class Tracker:
 
     def finish(self) -> Step:
         """Work off the round that was still open when the frames ended."""
-        harvest = _Harvest()
+        harvest = Harvest()
         for frames in self._rounds.rest():
             self._take_round(frames, harvest)
         return self._step(harvest)
 
-    def _step(self, harvest: _Harvest) -> Step:
+    def _step(self, harvest: Harvest) -> Step:
         return Step(self._track, tuple(harvest.sightings), tuple(harvest.rejections), tuple(harvest.estimates))
 
-    def _take_round(self, frames: Round, harvest: _Harvest) -> None:
+    def _take_round(self, frames: Round, harvest: Harvest) -> None:
         """Follow the track through a round, or look for the marker in it, and say where it is."""
         started_ns = self._stopwatch()
         harvest.find_ns = harvest.filter_ns = 0
@@ -126,6 +111,8 @@ class Tracker:
             return
         before = self._history.newest
         found = self._follow(frames, t_ns, harvest) if self._track is TrackState.TRACKING else None
+        if found is not None and self._carried_by_one(found):
+            found, self._track = None, TrackState.LOST
         if before is None or t_ns >= before.t_ns:
             few = found is None or 2 * len(found.used) < len(frames) * len(self._rig.marker)
             # The few balls where the track expects them may be something else: look whether the marker is elsewhere.
@@ -135,79 +122,33 @@ class Tracker:
         available_ns = max(frame.available_ns for frame in frames)
         stages = harvest.stages(started_ns - available_ns, self._stopwatch() - started_ns)
         self._sent_ns = found.state.t_ns
+        self._continuity.went_out(found.state)
         harvest.estimates.append(self._estimate(found, available_ns, stages))
 
-    def _follow(self, frames: Round, t_ns: int, harvest: _Harvest) -> Update | None:
+    def _follow(self, frames: Round, t_ns: int, harvest: Harvest) -> Update | None:
         """Update the track with a round; a late one is put in where it belongs and what came after is done again."""
         later = self._history.back_to(t_ns)
-        result = self._study(frames, self._ahead(t_ns), harvest)
+        result = self._study(frames, self._ahead(t_ns, self._cadence.breaks(frames)), harvest, self._history.newest)
         if result is not None:
             self._history.remember(result)
         for past in later:
-            again = self._update(self._ahead(past.t_ns), past.sightings)
+            again = self._study.update(self._ahead(past.t_ns), past.sightings)
             if isinstance(again, Update):
                 self._history.remember(again)
                 result = again
         return result
 
-    def _ahead(self, t_ns: int) -> Prediction:
-        """Return the newest state carried on to an instant; there is one while tracking."""
+    def _ahead(self, t_ns: int, clock_breaks: Mapping[int, float] = NO_BREAKS) -> Prediction:
+        """Return the newest state carried on to an instant; there is one while tracking.
+
+        clock_breaks: by camera, how far its clock may have jumped meanwhile [s].
+        """
         newest = self._history.newest
         if newest is None:
             raise ValueError("nothing is tracked yet")
-        return predict(newest, t_ns, self._tuning.process)
+        return predict(newest.with_clocks_open(clock_breaks) if clock_breaks else newest, t_ns, self._tuning.process)
 
-    def _see(self, frames: Round, ahead: Prediction, harvest: _Harvest, *, start: bool = False) -> Update | None:
-        """Look where a predicted state expects the balls and update it, or return None.
-
-        start: the state is a first guess, which every ball must bear out.
-        """
-        found, look = self._glance(frames, ahead, ahead.state, harvest, start=start)
-        if isinstance(found, Update) and not start and self._eyes.blind(ahead.state):
-            # Only now is known how fast the balls move, and so how their images are smeared: look again.
-            again, sharper = self._glance(frames, ahead, found.state, harvest, start=start)
-            found, look = (again, sharper) if isinstance(again, Update) else (found, look)
-        harvest.rejections += look.rejections
-        if isinstance(found, Rejected):
-            harvest.rejections.append(found)
-            return None
-        harvest.sightings += found.used
-        harvest.rejections += found.rejected
-        blindly = self._eyes.blind(found.state)
-        self._eyes.learn([one for one in look.fitted if one.sighting in found.used], blindly=blindly)
-        return found
-
-    def _glance(
-        self, frames: Round, ahead: Prediction, expected: State, harvest: _Harvest, *, start: bool
-    ) -> tuple[Update | Rejected, Look]:
-        """Look where a state expects the balls, and update the prediction by them."""
-        started_ns = self._stopwatch()
-        look = self._eyes.look(frames, expected)
-        looked_ns = self._stopwatch()
-        found = self._update(ahead, tuple(one.sighting for one in look.fitted))
-        harvest.find_ns += looked_ns - started_ns
-        harvest.filter_ns += self._stopwatch() - looked_ns
-        if isinstance(found, Update) and start and not self._all_seen_twice(found):
-            found = Rejected(Reason.GEOMETRY, "not every ball fits in two cameras", ahead.state.t_ns)
-        return found, look
-
-    def _study(self, frames: Round, ahead: Prediction, harvest: _Harvest, *, start: bool = False) -> Update | None:
-        """See, and go over the same images again as long as it is hardly known how balls look."""
-        found = self._see(frames, ahead, harvest, start=start)
-        for _ in range(self._eyes.lessons_due if found is not None else 0):
-            found = self._see(frames, ahead, _Harvest(), start=start) or found
-        return found
-
-    def _update(self, ahead: Prediction, sightings: tuple[BallSighting, ...]) -> Update | Rejected:
-        """Update a predicted state, unless it comes to lean as no vehicle does."""
-        result = update(ahead, sightings, self._rig, self._tuning.gate_probability)
-        if isinstance(result, Update) and (tilt := _tilt_rad(result.state)) > self._tuning.tilt_limit_rad:
-            limit_deg = math.degrees(self._tuning.tilt_limit_rad)
-            detail = f"the pose leans {math.degrees(tilt):.0f} deg, limit {limit_deg:.0f} deg: mirrored or mistaken"
-            return Rejected(Reason.GEOMETRY, detail, ahead.state.t_ns)
-        return result
-
-    def _search(self, frames: Round, t_ns: int, harvest: _Harvest) -> Update | None:
+    def _search(self, frames: Round, t_ns: int, harvest: Harvest) -> Update | None:
         """Look for the marker in whole frames, this round's and the other cameras' newest; start the track on it."""
         gains = self._eyes.gains
         for frame in frames:
@@ -218,9 +159,11 @@ class Tracker:
             found = self._search_in_other_light(fresh)
         if found is None:
             return None
-        before = self._history.newest
-        if before is not None and self._jumped(before, found.state):
-            self._resets = (self._resets + 1) % RESETS
+        if not self._continuity.believes(found.state):
+            detail = "the marker has turned in place as no vehicle does: colours swapped"
+            harvest.rejections.append(Rejected(Reason.GEOMETRY, detail, t_ns))
+            self._eyes.suppose(gains)
+            return None
         self._whole.clear()
         self._history.restart(found)
         self._track = TrackState.TRACKING
@@ -235,24 +178,26 @@ class Tracker:
         self._lights_tried += 1
         self._eyes.suppose(others)
         seen = {camera: (frame, self._look_everywhere(frame, others)) for camera, (frame, _) in fresh.items()}
-        found = self._start(seen, _Harvest())
+        found = self._start(seen, Harvest())
         if found is None:
             self._eyes.suppose(gains)
         return found
 
-    def _start(self, seen: Seen, harvest: _Harvest) -> Update | None:
+    def _start(self, seen: Seen, harvest: Harvest) -> Update | None:
         """Start on the marker among blobs, if every ball's image bears it out."""
         start = first_state(seen, self._rig, self._tuning.process)
         if isinstance(start, Rejected):
             harvest.rejections.append(start)
             return None
         guess = first_guess(self._still_known(start), self._tuning.process)
-        return self._study(tuple(frame for frame, _ in seen.values()), guess, harvest, start=True)
+        return self._study(tuple(frame for frame, _ in seen.values()), guess, harvest, None)
 
-    def _all_seen_twice(self, found: Update) -> bool:
-        """Say whether a start is borne out by every ball in two cameras: less fits many places."""
-        cameras = [{s.camera for s in found.used if s.ball == ball} for ball in range(len(self._rig.marker))]
-        return all(len(seen) >= 2 for seen in cameras)
+    def _carried_by_one(self, found: Update) -> bool:
+        """Say whether for a while no more than one ball was seen: what seems another is then soon a mistake."""
+        for sighting in found.used:
+            self._seen_ns[sighting.ball] = max(self._seen_ns[sighting.ball], sighting.t_ns)
+        newest_ns = max(self._seen_ns)
+        return sum(newest_ns - seen_ns <= ALONE_NS for seen_ns in self._seen_ns) < 2
 
     def _still_known(self, start: State) -> State:
         """Return a first guess with what the last track learned of the cameras: their noise and their clocks."""
@@ -263,22 +208,6 @@ class Tracker:
         P[OFFSETS:, OFFSETS:] = last.P[OFFSETS:, OFFSETS:]
         return replace(start, P=P, offsets_s=last.offsets_s, noise=last.noise)
 
-    def _jumped(self, before: State, found: State) -> bool:
-        """Say whether a pose found again is none that the old track can have led to."""
-        if not 0 <= found.t_ns - before.t_ns <= self._tuning.continuity_limit_ns:
-            return True
-        process, gap_s = self._tuning.process, (found.t_ns - before.t_ns) * 1e-9
-        if gap_s <= UNBROKEN_S:  # never out of sight: a brisk turn is no jump as long as a vehicle can fly it
-            reach_s = max(gap_s, LEAST_GAP_S)
-            step_m = float(np.linalg.norm(found.p_BinW - before.p_BinW))
-            turn = float(np.linalg.norm(so3.log(before.R_BtoW.T @ found.R_BtoW)))
-            if step_m <= process.initial_speed_m_s * reach_s and turn <= 3.0 * process.initial_rate_rad_s * reach_s:
-                return False
-        ahead = predict(before, found.t_ns, process).state
-        error = np.concatenate((found.p_BinW - ahead.p_BinW, so3.log(ahead.R_BtoW.T @ found.R_BtoW)))
-        distance2 = float(error @ np.linalg.solve((ahead.P + found.P)[:6, :6], error))
-        return distance2 > chi2_limit(self._tuning.gate_probability, 6)
-
     def _watch_the_time(self, t_ns: int) -> None:
         """Lose the track when nothing of it was seen for too long."""
         newest = self._history.newest
@@ -288,7 +217,7 @@ class Tracker:
     def _estimate(self, found: Update, available_ns: int, stages: dict[str, int]) -> Estimate:
         state = found.state
         covariance = state.P[:REPORTED, :REPORTED].copy()
-        covariance[:3, :3] += shared_covariance(state, self._rig, self._eyes.exposure_s)
+        covariance[:3, :3] += shared_covariance(state, self._rig, self._eyes.exposure_s) + sag_covariance(state)
         return Estimate(
             t_ns=state.t_ns,
             p_BinW=frozen_array(state.p_BinW),
@@ -299,17 +228,12 @@ class Tracker:
             clock_offsets_s=frozen_array(state.offsets_s),
             clock_sigmas_s=frozen_array([0.0, *(math.sqrt(v) for v in state.P.diagonal()[OFFSETS:].tolist())]),
             state=self._track,
-            reset_counter=self._resets,
+            reset_counter=self._continuity.resets,
             nis=found.nis,
             nis_dof=found.dof,
             available_ns=available_ns,
             stages_ns=MappingProxyType(stages),
         )
-
-
-def _tilt_rad(state: State) -> float:
-    """Return the angle between the body's z and the room's [rad]."""
-    return math.acos(max(-1.0, min(1.0, float(state.R_BtoW[2, 2]))))
 
 
 def _late(frame: Frame) -> Rejected:

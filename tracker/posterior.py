@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from tracker.compiled import compiled
-from tracker.correction import innovation_covariance, moved
+from tracker.correction import innovation_covariance, moved, moved_slope
 from tracker.measure import Indices
 from tracker.noise import learned
 from tracker.types import Array
@@ -22,10 +22,10 @@ def settled(
         mean, dx: the prior's, and the error found.  P: after the update, about the prior's attitude.
         noise, cameras, u, inverse: as `learned` takes them.
 
-    Source: exp(theta + d) = exp(theta) exp(J_r(theta) d), so the error about the new attitude is J_r d.
+    Source: the error about the new mean is G d, see `moved_slope`.
     """
-    E, J_r, turn = np.empty((3, 3)), np.empty((3, 3)), np.eye(len(P))
+    E, J_r = np.empty((3, 3)), np.empty((3, 3))
     now = moved(mean, dx, E, J_r)
-    turn[3:6, 3:6] = J_r
+    turn = moved_slope(mean, now, E, J_r, len(P))
     after = innovation_covariance(turn, P, np.zeros(P.shape))
     return now, after, learned(noise, cameras, u, inverse)

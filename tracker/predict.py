@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from tracker import manoeuvre
 from tracker.compiled import compiled
 from tracker.manoeuvre import expected, later
+from tracker.pivot import best_known, moved_to
 from tracker.singer import carried, process_noise
 from tracker.state import OFFSETS, Process, State
 from tracker.types import Array
@@ -22,12 +23,22 @@ class Prediction:
 
     state: with the covariance that is expected, for who looks for the balls.
     P_coasted: (n, n) covariance without any manoeuvre.  dt: time since the last update [s].
+    pivot_inB: (3,) the point of the body that was known best before [m], the origin where no turn was open.
     """
 
     state: State
     P_coasted: Array
     dt: float
     process: Process
+    pivot_inB: Array = field(default_factory=lambda: np.zeros(3))
+
+    def about_pivot(self) -> Prediction:
+        """Return the same prediction, its state and covariances told of the pivot instead of the origin."""
+        if not self.pivot_inB.any():
+            return self
+        mean, P, P_coasted = _told_of(self.state.mean, self.pivot_inB, self.state.P, self.P_coasted)
+        state = self.state.at_mean(self.state.t_ns, mean, P, self.state.levels, self.state.noise)
+        return Prediction(state, P_coasted, self.dt, self.process, self.pivot_inB)
 
 
 def predict(state: State, t_ns: int, process: Process) -> Prediction:
@@ -37,8 +48,10 @@ def predict(state: State, t_ns: int, process: Process) -> Prediction:
         raise ValueError(f"cannot predict back by {-dt} s")
     walk = OFFSET_WALK**2 * dt if process.clock_offset_s > 0.0 else 0.0
     of = manoeuvre.variances(process)
-    mean, P_coasted, P, levels = _ahead(state.mean, state.P, state.levels, of, dt, process.manoeuvre_s, walk)
-    return Prediction(state.at_mean(t_ns, mean, P, levels, state.noise), P_coasted, dt, process)
+    mean = state.mean
+    pivot_inB = best_known(mean, state.P)
+    mean, P_coasted, P, levels = _ahead(mean, state.P, pivot_inB, state.levels, of, dt, process.manoeuvre_s, walk)
+    return Prediction(state.at_mean(t_ns, mean, P, levels, state.noise), P_coasted, dt, process, pivot_inB)
 
 
 @compiled("f8[:, ::1](f8[:, ::1], f8[:, ::1])")
@@ -53,25 +66,49 @@ def _sparse_product(F: Array, P: Array) -> Array:
     return product
 
 
+@compiled("f8[:, ::1](f8[:, ::1], f8[:, ::1])")
+def _conjugated(F: Array, P: Array) -> Array:
+    """Return F P F' (n, n)."""
+    return _sparse_product(F, _sparse_product(F, P).T.copy())
+
+
+@compiled("Tuple((f8[::1], f8[:, ::1], f8[:, ::1]))(f8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")
+def _told_of(mean: Array, point_inB: Array, P: Array, P_coasted: Array) -> tuple[Array, Array, Array]:
+    """Return a mean and two covariances, told of another point of the body."""
+    moved, J = moved_to(mean, point_inB, len(P))
+    return moved, _conjugated(J, P), _conjugated(J, P_coasted)
+
+
 @compiled("Tuple((f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1]))"
-          "(f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8, f8, f8)")  # fmt: skip
+          "(f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8, f8, f8)")  # fmt: skip
 def _ahead(
-    mean: Array, P: Array, levels: Array, of: Array, dt: float, T: float, walk: float
+    mean: Array, P: Array, pivot: Array, levels: Array, of: Array, dt: float, T: float, walk: float
 ) -> tuple[Array, Array, Array, Array]:
     """Return mean, coasted covariance F P F', covariance with the expected manoeuvre, and levels, after dt.
 
-    of: variances of the levels.  walk: variance that each clock offset gains [s^2].
+    pivot: (3,) in B.  of: variances of the levels.  walk: variance that each clock offset gains [s^2].
     """
     size = len(P)
-    after, F = carried(mean, dt, T, size)
-    coasted = _sparse_product(F, _sparse_product(F, P).T.copy())
+    start, there = moved_to(mean, pivot, size)
+    after, F = carried(start, dt, T, size)
+    after, back = moved_to(after, -pivot, size)
+    coasted = _conjugated(_sparse_product(F, there), P)
     for i in range(OFFSETS, size):
         coasted[i, i] += walk
     then = later(levels, dt)
     translation, rotation = expected(then, of)
-    return after, coasted, coasted + process_noise(size, dt, T, translation, rotation), then
+    P_then = coasted + process_noise(size, dt, T, translation, rotation)
+    return after, _conjugated(back, coasted), _conjugated(back, P_then), then
 
 
 def first_guess(state: State, process: Process) -> Prediction:
     """Take a state found in whole frames for a prediction."""
     return Prediction(state, state.P, 0.0, process)
+
+
+def at_origin(state: State, pivot_inB: Array) -> State:
+    """Return a state that is told of a point of the body as that of the body's origin."""
+    if not pivot_inB.any():
+        return state
+    mean, P, _ = _told_of(state.mean, -pivot_inB, state.P, state.P)
+    return state.at_mean(state.t_ns, mean, P, state.levels, state.noise)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -79,6 +80,18 @@ class State:
             alpha_BinB=self.alpha_BinB + dx[ANGULAR_ACCELERATION],
             offsets_s=offsets_s,
         )
+
+    def with_clocks_open(self, breaks_s: Mapping[int, float]) -> State:
+        """Return the state less sure of the clock offsets of some cameras, by one sigma of each [s].
+
+        Camera 0's clock counts: when it jumps, it is the offsets of all others that are less sure.
+        """
+        P = self.P.copy()
+        for camera, break_s in breaks_s.items():
+            jump = np.full(len(P) - OFFSETS, break_s) if camera == 0 else np.zeros(len(P) - OFFSETS)
+            jump[camera - 1 : camera] = break_s
+            P[OFFSETS:, OFFSETS:] += np.outer(jump, jump)
+        return replace(self, P=P)
 
     @property
     def mean(self) -> Array:

@@ -22,7 +22,8 @@ from tracker.types import Array, Image
 
 CORE_SHARE = 0.6  # of the radius: further out the background shines in
 UNITY = 16  # of the fixed point that pixels are multiplied in: a colour's box is far wider than a sixteenth
-LEARN_BALLS = 9  # of each colour, until its own colour is taken as known
+SLIGHT_LOG = 0.12  # a gain within this factor changes no ball's colour so far that its box would not hold it
+LEARN_BALLS = 4  # of each colour, until its own colour is taken as known
 FOLLOW_SHARE = 0.5  # of a newly seen light
 MOST_LOG = 0.7  # a gain beyond exp(0.7), twice, is a mistake
 GAIN_STEP = 0.18  # of the logarithm, between lights that are tried: a sixth, well within the width of a colour's box
@@ -42,8 +43,12 @@ class Gains:
 
     @property
     def undoing(self) -> tuple[int, int]:
-        """Return what to multiply blue and red by to undo them, in 1 / UNITY."""
-        return round(UNITY / self.blue), round(UNITY / self.red)
+        """Return what to multiply blue and red by to undo them, in 1 / UNITY; slight ones are left alone."""
+        return _undoing(self.blue), _undoing(self.red)
+
+
+def _undoing(gain: float) -> int:
+    return UNITY if abs(math.log(gain)) < SLIGHT_LOG else round(UNITY / gain)
 
 
 NEUTRAL = Gains()
@@ -60,6 +65,11 @@ class Tint:
 
     gains: Gains = NEUTRAL
     colours: Mapping[int, tuple[float, float, float, int]] = field(default_factory=dict)
+
+    @property
+    def settled(self) -> bool:
+        """Say whether the own colour of every ball seen so far is known."""
+        return bool(self.colours) and all(count >= LEARN_BALLS for *_, count in self.colours.values())
 
     def learned(self, seen: Sequence[tuple[int, Array]]) -> Tint:
         """Return what is known after one image.

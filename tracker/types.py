@@ -32,6 +32,7 @@ class Reason(StrEnum):
     UNDECODABLE = "undecodable"  # an image file or packet that is no image
     WRONG_SIZE = "wrong_size"  # an image whose size is not the calibration's
     REPEATED = "repeated"  # an image that its camera gave before: the camera hangs, whatever its stamps say
+    EARLY = "early"  # a frame stamped far ahead of all others, alone
     LATE = "late"  # a frame older than the filter can go back to
     NO_BALL = "no_ball"  # a ball expected in a region, nothing of its colour there
     AT_BORDER = "at_border"  # a ball cut by the image's border

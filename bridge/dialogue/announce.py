@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from enum import IntEnum
 
-from bridge.pack import make_message
+from bridge.dialect import make_message
 from bridge.wire import Message
 
 TEXT_BYTES = 50

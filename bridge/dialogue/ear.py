@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections import deque
 
 from bridge.clock import Nanoseconds
+from bridge.dialect import Reader
 from bridge.dialogue.timesync import answer
 from bridge.links import Link
-from bridge.pack import Reader
 from bridge.signing import Signing
 from bridge.wire import Received
 

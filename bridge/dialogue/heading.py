@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 
+from bridge.dialect import enum, make_message, message_id
 from bridge.dialogue.peer import Peer
 from bridge.dialogue.yaw_watch import NOTHING, YawReading, YawWatch
-from bridge.pack import enum, make_message, message_id
 from bridge.wire import Message, Received
 from tracker.types import Array
 

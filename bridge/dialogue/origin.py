@@ -10,8 +10,8 @@ import math
 from dataclasses import dataclass
 from enum import StrEnum
 
+from bridge.dialect import enum, make_message, message_id
 from bridge.dialogue.peer import Autopilot, Peer
-from bridge.pack import enum, make_message, message_id
 from bridge.wire import Message, Received
 
 DO_SET_GLOBAL_ORIGIN = 611  # MAV_CMD of 2025, not yet in the dialect

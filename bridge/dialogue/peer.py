@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
-from bridge.pack import HEARTBEAT, enum
+from bridge.dialect import enum
+from bridge.pack import HEARTBEAT
 from bridge.wire import Received
 
 _OURS = 197  # our own component, as forwarded back by an autopilot

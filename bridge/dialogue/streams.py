@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
+from bridge.dialect import enum, frame_bytes, make_message, message_id
 from bridge.dialogue.peer import Autopilot, Peer
-from bridge.pack import enum, frame_bytes, make_message, message_id
 from bridge.wire import Message, Received
 
 ANSWER_NS = 1_000_000_000

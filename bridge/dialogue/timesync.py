@@ -10,7 +10,7 @@ import math
 from collections import deque
 from dataclasses import dataclass
 
-from bridge.pack import make_message
+from bridge.dialect import make_message
 from bridge.wire import Message, Received
 
 TIMESYNC = "TIMESYNC"

@@ -6,8 +6,9 @@ from collections import Counter, deque
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from bridge.dialect import enum
 from bridge.dialogue.peer import Peer
-from bridge.pack import HEARTBEAT, enum
+from bridge.pack import HEARTBEAT
 from bridge.wire import Received
 
 MAVLINK_1 = 0xFE

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from bridge.dialect import enum, make_message, message_id
 from bridge.dialogue.peer import Autopilot, Peer
-from bridge.pack import enum, make_message, message_id
 from bridge.wire import Message
 
 AGAIN_NS = 2_000_000_000

@@ -2,12 +2,13 @@
 
 from bridge.settings.choose_rig import ChosenRig, RigOrigin, marker_of, rig_of
 from bridge.settings.load import load_settings, shipped_configs
-from bridge.settings.models import LinkSettings, MonitorSettings, Settings, TrackerSettings
+from bridge.settings.models import LinkSettings, MonitorSettings, PlaceSettings, Settings, TrackerSettings
 
 __all__ = [
     "ChosenRig",
     "LinkSettings",
     "MonitorSettings",
+    "PlaceSettings",
     "RigOrigin",
     "Settings",
     "TrackerSettings",

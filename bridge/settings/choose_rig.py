@@ -76,7 +76,7 @@ def _cameras(settings: Settings, source: tuple[Camera, ...] | None) -> tuple[tup
         return _calibrated(Path(settings.rig.calibration)), RigOrigin.CALIBRATION
     if source is not None:
         return source, RigOrigin.SOURCE
-    return tuple(_nominal(camera) for camera in settings.rig.cameras), RigOrigin.NOMINAL
+    return tuple(camera_of(camera) for camera in settings.rig.cameras), RigOrigin.NOMINAL
 
 
 def _calibrated(directory: Path) -> tuple[Camera, ...]:
@@ -87,7 +87,12 @@ def _calibrated(directory: Path) -> tuple[Camera, ...]:
         raise OperatorError(f"[rig] calibration: {error}") from error
 
 
-def _nominal(camera: CameraSettings) -> Camera:
+def camera_of(camera: CameraSettings) -> Camera:
+    """Make the camera of its table.
+
+    Raises:
+        OperatorError: values that are no camera's.
+    """
     return make_camera(
         camera.name,
         (camera.width_px, camera.height_px),

@@ -14,7 +14,7 @@ from bridge.settings.models import Settings
 # Longest first: `_rad_s2` must not be read as `_s2`.
 UNITS = {
     "_rad_s2": " rad/s^2", "_m_s2": " m/s^2", "_rad_s": " rad/s", "_m_s": " m/s",
-    "_deg": " deg", "_us": " us", "_g": " g", "_mm": " mm", "_ms": " ms", "_px": " px", "_hz": " Hz",
+    "_deg": " deg", "_us": " us", "_g": " g", "_mm": " mm", "_ms": " ms", "_px": " px", "_hz": " Hz", "_m": " m",
 }  # fmt: skip
 LIMITS = {
     "greater_than": ("gt", "greater than"),

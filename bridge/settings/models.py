@@ -5,30 +5,29 @@ Keys carry their unit as a suffix (`_mm`, `_deg`, `_ms`, `_px`, `_m_s2`), which 
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, Strict, model_validator
+from pydantic import Field, Strict, model_validator
 
-Real = Annotated[float, Strict()]
-Positive = Annotated[float, Strict(), Field(gt=0)]
-NotNegative = Annotated[float, Strict(), Field(ge=0)]
-Share = Annotated[float, Strict(), Field(ge=0, le=1)]
-Pixels = Annotated[int, Strict(), Field(gt=0)]
-Byte = Annotated[int, Strict(), Field(ge=0, le=255)]
-Name = Annotated[str, Field(min_length=1)]
-Triple = Annotated[tuple[Real, ...], Field(min_length=3, max_length=3)]
-Row = Annotated[tuple[Real, ...], Field(min_length=4, max_length=4)]
+from bridge.settings.section import (
+    Byte,
+    Name,
+    NotNegative,
+    Pixels,
+    Positive,
+    Range,
+    Real,
+    Row,
+    Section,
+    Share,
+    Triple,
+    refuse_twins,
+)
+from bridge.settings.vehicle import VehicleSettings
 
 MessageName = Literal["VISION_POSITION_ESTIMATE", "ATT_POS_MOCAP", "VISION_SPEED_ESTIMATE", "ODOMETRY"]
 COLOUR_KEYS = ("hue_deg", "hue_tolerance_deg", "saturation_min", "value_min", "bgr")
-
-
-class Section(BaseModel):
-    """A table of the config: frozen, and no key it does not know."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class RoomSettings(Section):
@@ -182,38 +181,6 @@ class LogSettings(Section):
     jpeg_quality: Annotated[int, Strict(), Field(ge=1, le=100)] = 95
 
 
-class ServoSettings(Section):
-    """One servo: its pulse at rest, and how much full stick of each kind adds to it."""
-
-    channel: Annotated[int, Strict(), Field(ge=1, le=16)]
-    trim_us: Positive
-    right_us: Real = 0.0
-    nose_up_us: Real = 0.0
-    nose_right_us: Real = 0.0
-    up_us: Real = 0.0
-
-
-class VehicleSettings(Section):
-    """The vehicle's sheet: mass and geometry, what full sticks give, and which servo does what."""
-
-    name: Name
-    mass_g: Positive
-    rotor: Literal["flybar", "coaxial", "other"]
-    rotor_diameter_mm: Positive
-    centre_of_mass_mm: Triple = (0.0, 0.0, 0.0)
-    max_tilt_deg: Annotated[float, Strict(), Field(gt=0, lt=90)] = 20.0
-    max_speed_m_s: Positive = 1.5
-    full_tilt_deg: Annotated[float, Strict(), Field(gt=0, lt=90)]
-    full_yaw_rate_deg_s: Positive
-    full_climb_m_s2: Positive
-    servos: tuple[ServoSettings, ...] = ()
-
-    @model_validator(mode="after")
-    def _channels_differ(self) -> Self:
-        refuse_twins("servo channel", [str(servo.channel) for servo in self.servos])
-        return self
-
-
 class LinkSettings(Section):
     """One way to an autopilot, and what goes over it at every estimate: the profile's messages unless it names some."""
 
@@ -224,6 +191,41 @@ class LinkSettings(Section):
     def _messages_differ(self) -> Self:
         refuse_twins("message", self.messages or ())
         return self
+
+
+class MountSettings(Section):
+    """A box of the room in which a camera may stand, flat or a line if it likes."""
+
+    name: Name
+    x_m: Range
+    y_m: Range
+    z_m: Range
+
+
+class PlaceSettings(Section):
+    """What `posebridge place` may choose from; nothing else reads it."""
+
+    room_x_m: Range = (-2.5, 2.5)
+    room_y_m: Range = (-2.5, 2.5)
+    room_z_m: Range = (-1.2, 2.4)
+    volume_x_m: Range = (-1.0, 1.0)
+    volume_y_m: Range = (-0.5, 0.5)
+    volume_z_m: Range = (-0.75, 0.75)
+    walls: tuple[Literal["x-", "x+", "y-", "y+", "ceiling"], ...] = ("x-", "x+", "y-", "y+", "ceiling")
+    wall_z_m: Range = (0.0, 2.3)
+    clearance_m: NotNegative = 0.1
+    mounts: tuple[MountSettings, ...] = ()
+    apart_m: NotNegative = 0.3
+    lenses_deg: Annotated[tuple[Annotated[float, Strict(), Field(gt=1, lt=150)], ...], Field(min_length=1)] = (
+        30.0, 45.0, 60.0, 75.0,
+    )  # fmt: skip
+    width_px: Pixels = 640
+    height_px: Pixels = 480
+    tilt_deg: Annotated[float, Strict(), Field(ge=0, le=80)] = 20.0
+    grey_noise: Annotated[float, Strict(), Field(gt=0, le=1)] = 0.03
+    blur_px: Positive = 0.5
+    least_radius_px: Positive = 2.0
+    coverage_min: Share = 0.99
 
 
 class Settings(Section):
@@ -238,6 +240,7 @@ class Settings(Section):
     monitor: MonitorSettings = MonitorSettings()
     log: LogSettings = LogSettings()
     vehicle: VehicleSettings | None = None
+    place: PlaceSettings = PlaceSettings()
     links: tuple[LinkSettings, ...] = ()
 
     @model_validator(mode="after")
@@ -262,10 +265,3 @@ class Settings(Section):
         said = {"frames": frames, "frames_mb": frames_mb}
         log = self.log.model_copy(update={key: value for key, value in said.items() if value is not None})
         return self.model_copy(update={"log": log})
-
-
-def refuse_twins(what: str, names: Sequence[str]) -> None:
-    """Raise ValueError when a name comes twice."""
-    twins = [name for name, count in Counter(names).items() if count > 1]
-    if twins:
-        raise ValueError(f"{what} {twins[0]} comes twice; each must differ: rename or remove one")

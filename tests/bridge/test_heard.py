@@ -15,6 +15,7 @@ import pytest
 from foxglove_schemas_protobuf.Log_pb2 import Log
 from mcap.reader import make_reader
 
+from bridge.dialect import Encoder, Identity, Reader, make_message
 from bridge.dialogue import Terms
 from bridge.dialogue.peer import Autopilot, Peer
 from bridge.dialogue.streams import Wanted
@@ -23,7 +24,7 @@ from bridge.links import MemoryLink, open_link
 from bridge.log import received
 from bridge.log.reader import LogReader
 from bridge.outlet import Outlet, Spout
-from bridge.pack import Encoder, Identity, Packer, Reader, make_message
+from bridge.pack import Packer
 from bridge.telemetry.logged import LoggedRun
 from bridge.wire import FieldValue, LinkState, Message
 from tests.bridge.estimates import estimate, step

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from bridge.dialect import Encoder, Identity
 from bridge.links import line_bytes_s, open_link
 from bridge.links.uri import Address, parse
-from bridge.pack import Encoder, Identity
 from tests.bridge.estimates import beat
 from tests.contracts.far_ends import SerialFar, UdpCaller
 from tracker.errors import OperatorError

@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 from bridge.clock import Nanoseconds
+from bridge.dialect import Encoder, Identity, Reader, make_message
 from bridge.dialogue import Terms
 from bridge.links import MemoryLink, open_link
 from bridge.outlet import Outlet, Spout, open_outlet
-from bridge.pack import MESSAGES, Encoder, Identity, Packer, Reader, make_message
+from bridge.pack import MESSAGES, Packer
 from bridge.wire import Received, Sent
 from tests.bridge.estimates import beat, estimate, random_covariance, step
 from tests.bridge.mavlink_by_hand import ByHand, parse

@@ -13,8 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import common
 
+from bridge.dialect import Encoder, Identity, Reader, make_message
 from bridge.ned import NedFrame, pose_jacobian, rotation_from_room, turned_triangle
-from bridge.pack import MESSAGES, Encoder, Identity, Packer, Reader, heartbeat, make_message
+from bridge.pack import MESSAGES, Packer, heartbeat
 from tests.bridge.estimates import estimate, random_covariance
 from tests.bridge.mavlink_by_hand import ByHand, parse
 from tracker import so3

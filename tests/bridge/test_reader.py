@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from bridge.pack import Encoder, Identity, Packer, Reader
+from bridge.dialect import Encoder, Identity, Reader
+from bridge.pack import Packer
 from tests.bridge.estimates import beat, estimate
 from tests.bridge.mavlink_by_hand import DEFINITIONS, crc_x25, parse
 

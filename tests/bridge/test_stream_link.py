@@ -10,10 +10,11 @@ from time import perf_counter_ns
 
 import pytest
 
+from bridge.dialect import Encoder, Identity
 from bridge.links import open_link
 from bridge.links.ledger import Ledger
 from bridge.links.stream import StreamLink
-from bridge.pack import Encoder, Identity, Packer, heartbeat
+from bridge.pack import Packer, heartbeat
 from tests.bridge.estimates import beat, estimate
 from tests.bridge.mavlink_by_hand import parse
 from tests.contracts.far_ends import SerialFar, eventually

@@ -11,8 +11,9 @@ import pymavlink
 import pytest
 from pymavlink import mavutil
 
+from bridge.dialect import Encoder, Identity, Reader, make_message
 from bridge.heard import Heard
-from bridge.pack import Encoder, Identity, Packer, Reader, make_message
+from bridge.pack import Packer
 from bridge.wire import Received, Sent
 from tests.bridge.estimates import estimate, step
 from tests.bridge.recordings import LINK, START_NS, WALL_NS, recorder, turn

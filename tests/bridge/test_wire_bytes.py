@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from bridge.pack import MESSAGES, Encoder, Identity, Packer, heartbeat
+from bridge.dialect import Encoder, Identity
+from bridge.pack import MESSAGES, Packer, heartbeat
 from bridge.wire import Message
 from tests.bridge.estimates import estimate
 from tests.bridge.mavlink_by_hand import parse

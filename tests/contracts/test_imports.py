@@ -98,7 +98,7 @@ def test_the_tracker_knows_no_link_no_message_no_config_and_no_screen() -> None:
 
 def test_only_one_module_imports_pymavlink() -> None:
     users = {module.path for module in _modules(*ROOMS) if "pymavlink" in map(_top, module.imports())}
-    assert users == {"bridge/pack.py"}
+    assert users == {"bridge/dialect.py"}
 
 
 def test_only_the_links_and_the_far_ends_of_simulations_open_sockets_and_ports() -> None:

@@ -9,8 +9,8 @@ from time import perf_counter_ns
 
 import pytest
 
+from bridge.dialect import Encoder, Identity
 from bridge.links import Encode, Link, open_link
-from bridge.pack import Encoder, Identity
 from bridge.wire import Sent
 from tests.bridge.estimates import beat
 from tests.contracts.far_ends import NOTICED, UNNOTICED, FarEnd, UdpFar, eventually

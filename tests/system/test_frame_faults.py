@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -50,6 +51,19 @@ def shuffled(events: list[Event]) -> Iterable[Event]:
     return [events[k] for k in np.argsort(np.arange(len(events)) + jitter)]
 
 
+def another_clock(events: list[Event]) -> Iterable[Event]:
+    """Let the clock of camera 1 show 50 ms more for a second."""
+    for k, event in enumerate(events):
+        off = isinstance(event, Frame) and event.camera == 1 and 2 * FIRST <= k < 2 * (FIRST + 15)
+        yield replace(event, t_ns=event.t_ns + 50_000_000) if off else event
+
+
+def stamped_ahead(events: list[Event]) -> Iterable[Event]:
+    """Stamp one frame 5 s in the future."""
+    for k, event in enumerate(events):
+        yield replace(event, t_ns=event.t_ns + 5_000_000_000) if k == 2 * FIRST + 1 else event
+
+
 CASES = [
     Case("a third of all frames dropped", spoil=dropped, least=FRAMES // 2, last_s=FIRST_S, ends=False),
     Case("two pairs dropped", spoil=pair_dropped, least=FRAMES - 2, last_s=FIRST_S + 0.14),
@@ -61,6 +75,8 @@ CASES = [
     Case("a camera that damages all for a second", during(Trouble(broken_from=0.45), [1])),
     Case("frames one pair late", spoil=late(1), least=FRAMES - 4),
     Case("frames three pairs late", spoil=late(3), least=FRAMES - 4),
+    Case("a clock that jumps and comes back", spoil=another_clock),
+    Case("a frame stamped far ahead", spoil=stamped_ahead, last_s=FIRST_S + 0.1, least=FRAMES - 1),
     Case("frames out of order", spoil=shuffled, least=FRAMES // 2, ends=False),
 ]
 each_case = pytest.mark.parametrize("case", CASES, ids=str)

@@ -19,9 +19,12 @@ def cast(blue: float, red: float) -> flights.Fault:
     return fault
 
 
+PAINTS = [ball.colour.bgr for ball in RIG.marker.balls]
+ALL_SWAPPED = Trouble(repainted=((0, PAINTS[1]), (1, PAINTS[2]), (2, PAINTS[0])))
+
+
 def swapped(one: int, other: int) -> Trouble:
-    paints = [ball.colour.bgr for ball in RIG.marker.balls]
-    return Trouble(repainted=((one, paints[other]), (other, paints[one])))
+    return Trouble(repainted=((one, PAINTS[other]), (other, PAINTS[one])))
 
 
 ONE_FRAME_S = FIRST_S + 0.5 / RATE_HZ
@@ -34,6 +37,8 @@ CASES = [
     Case("light halved for a second", during(Trouble(light_gain=0.5))),
     Case("yellow and green swapped for a frame", during(swapped(0, 1), last_s=ONE_FRAME_S), least=FRAMES - 1),
     Case("green and orange swapped for a frame", during(swapped(1, 2), last_s=ONE_FRAME_S), least=FRAMES - 1),
+    Case("all colours swapped round for a frame", during(ALL_SWAPPED, last_s=ONE_FRAME_S), least=FRAMES - 1),
+    Case("yellow and green swapped for long", during(swapped(0, 1), last_s=2.8), last_s=2.8, least=FRAMES - 12),
     Case("green and orange swapped in camera 0", during(swapped(1, 2), [0], last_s=ONE_FRAME_S), least=FRAMES - 1),
 ]
 each_case = pytest.mark.parametrize("case", CASES, ids=str)

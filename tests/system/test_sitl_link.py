@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from bridge.pack import Encoder, Identity, Reader, make_message
+from bridge.dialect import Encoder, Identity, Reader, make_message
 from bridge.preflight.verdict import Mark
 from bridge.signing import Seal, make_key, open_seal
 from bridge.wire import Received

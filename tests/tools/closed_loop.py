@@ -7,8 +7,9 @@ from typing import Self
 
 import numpy as np
 
+from bridge.dialect import Encoder, Identity
 from bridge.links import open_link
-from bridge.pack import Encoder, Identity, Packer, heartbeat
+from bridge.pack import Packer, heartbeat
 from tools.simulate.autopilot.origins import Origin
 from tools.simulate.helicopter import Helicopter
 from tools.simulate.mission import Mission

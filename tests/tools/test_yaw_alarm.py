@@ -7,10 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from bridge.dialect import Encoder, Identity, Reader
 from bridge.dialogue import DialogueState, Terms
 from bridge.links import MemoryLink, open_link
 from bridge.outlet import Outlet, Spout
-from bridge.pack import Encoder, Identity, Packer, Reader
+from bridge.pack import Packer
 from tools.simulate.autopilot.origins import Origin
 from tools.simulate.autopilot.vessel import Mode
 from tools.simulate.helicopter import Helicopter

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
 from tests.tracker.rigs import (
@@ -211,12 +212,18 @@ def test_the_update_is_the_most_likely_state_between_prior_and_pixels(seed: int)
     seen = sightings(FLYING, RIG, [(0, 0), (1, 30_000_000)], sigma_px, rng)
     root = np.sqrt(np.diag(P))
 
+    def put_in(error: Array) -> State:
+        """Put an error in; rates are told as the room sees them, which is how the filter's prior speaks of them."""
+        turn = Rotation.from_rotvec(error[3:6]).as_matrix()
+        w_BinB = turn.T @ (start.w_BinB + error[9:12] + np.cross(error[3:6], start.w_BinB))
+        return replace(perturbed(start, error), w_BinB=w_BinB)
+
     def misfit(scaled: Array) -> Array:
-        guess = sightings(perturbed(start, scaled * root), RIG, [(0, 0), (1, 30_000_000)], sigma_px)
+        guess = sightings(put_in(scaled * root), RIG, [(0, 0), (1, 30_000_000)], sigma_px)
         pixels = [(s.uv_px - g.uv_px) / sigma_px for s, g in zip(seen, guess, strict=True)]
         return np.concatenate((scaled, *pixels))
 
-    likeliest = perturbed(start, least_squares(misfit, np.zeros(19), xtol=1e-12).x * root)
+    likeliest = put_in(least_squares(misfit, np.zeros(19), xtol=1e-12).x * root)
     found = updated(update(start, seen, RIG, OPEN)).state
     off = difference(likeliest, found)
     assert np.sqrt(off @ np.linalg.solve(found.P[:12, :12], off)) < 0.005

@@ -85,9 +85,13 @@ def test_other_lights_come_nearest_first_and_are_all_different() -> None:
 
 
 def test_undoing_turns_a_tinted_pixel_back() -> None:
-    blue, red = Gains(0.8, 1.25).undoing
+    blue, red = Gains(0.8, 1.333).undoing
     assert 80 * blue // UNITY == 100
-    assert round(125 * red / UNITY) == 100
+    assert 133 * red // UNITY == pytest.approx(100, abs=4)
+
+
+def test_slight_tints_are_left_alone() -> None:
+    assert Gains(1.1, 0.9).undoing == (UNITY, UNITY)
 
 
 def test_the_core_of_a_ball_has_its_paints_colour_whatever_is_behind() -> None:

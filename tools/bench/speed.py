@@ -8,12 +8,13 @@ from itertools import chain, islice
 from pathlib import Path
 
 from bridge.clock import StreamClock
+from bridge.dialect import Encoder, Identity
 from bridge.dialogue import Terms
 from bridge.histogram import Histogram
 from bridge.links import open_link
 from bridge.monitor import Monitor
 from bridge.outlet import DEFAULT_SYSTEM_ID, Outlet, Spout
-from bridge.pack import MESSAGES, Encoder, Identity, Packer
+from bridge.pack import MESSAGES, Packer
 from bridge.run import Outlets, close, run
 from bridge.settings import Settings
 from bridge.summary import Percentiles, Summary
@@ -30,7 +31,7 @@ from tools.steady import steady
 from tracker.types import Frame, Silence, TrackState
 
 WARM_UP = 300  # instants: templates drawn, light learned
-LONG_AGO_NS = 3_600_000_000_000
+LONG_AGO_NS, JUST_BEFORE_NS = 3_600_000_000_000, 500_000_000
 LAP = 120  # instants: the eight takes 8 s at 15 Hz
 SNAPSHOTS = 100
 
@@ -132,8 +133,8 @@ def _acquisition(settings: Settings, clocks: Clocks, footage: Footage) -> Percen
     tracker = tracker_of(settings, footage.rig, clocks)
     histogram = Histogram()
     for k, pair in enumerate(footage.play(2 * len(footage.pairs))):
-        lost = tracker.step(Silence(pair[0].t_ns + 2 * k * LONG_AGO_NS))
-        later = [Frame(frame.camera, frame.t_ns + (2 * k + 1) * LONG_AGO_NS, frame.image) for frame in pair]
+        lost = tracker.step(Silence(pair[0].t_ns + k * LONG_AGO_NS - JUST_BEFORE_NS))
+        later = [Frame(frame.camera, frame.t_ns + k * LONG_AGO_NS, frame.image) for frame in pair]
         started_ns = clocks.stopwatch()
         steps = [tracker.step(frame) for frame in later]
         if lost.state is not TrackState.TRACKING and k >= len(footage.pairs) and any(s.estimates for s in steps):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from bridge.settings import Settings, rig_of
-from bridge.settings.models import VehicleSettings
+from bridge.settings.vehicle import VehicleSettings
 from tools.excite.manoeuvre import Kind, Manoeuvre, Sequence
 from tools.simulate.dynamics import GRAVITY
 from tools.sysid.parameters import AXES, Axis

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from bridge.pack import Encoder, Identity, Reader, enum, make_message
+from bridge.dialect import Encoder, Identity, Reader, enum, make_message
 from bridge.wire import FieldValue, Received
 from tools.sitl.wire import Wire
 

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from bridge.pack import Encoder, Identity, Packer, heartbeat
+from bridge.dialect import Encoder, Identity
+from bridge.pack import Packer, heartbeat
 from bridge.settings import Settings
 from tools.simulate.autopilot.reports import LAND
 from tools.simulate.helicopter import Helicopter

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from bridge.settings.models import VehicleSettings
+from bridge.settings.vehicle import VehicleSettings
 from tools.simulate.dynamics import GRAVITY
 from tools.sysid.parameters import INDEX
 from tracker.types import Array

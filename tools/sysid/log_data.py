@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from bridge.log import topics, triangle
 from bridge.log.reader import LogReader
 from bridge.log.received import RECEIVED_PREFIX, TIMESYNC
-from bridge.settings.models import VehicleSettings
+from bridge.settings.vehicle import VehicleSettings
 from bridge.telemetry.logged import CONFIG_ATTACHMENT
 from tools.sysid.flight_data import SHORTEST, FlightData, Track, make_sticks
 from tools.sysid.servo_clock import Clock, on_stream_clock

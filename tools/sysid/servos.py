@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from bridge.settings.models import VehicleSettings
+from bridge.settings.vehicle import VehicleSettings
 from tracker.errors import OperatorError
 from tracker.types import Array
 

@@ -43,6 +43,7 @@ class LiveSource(ClosesOnExit):
         monotonic: Monotonic,
         stopwatch: Stopwatch,
         opener: Opener = open_address,
+        fewest: int = MIN_CAMERAS,
     ) -> None:
         """Open the cameras and start reading: a camera nobody reads would queue old frames.
 
@@ -51,10 +52,11 @@ class LiveSource(ClosesOnExit):
             monotonic: the clock of `Frame.t_ns`; for a driver's own stamps to count it must be CLOCK_MONOTONIC.
             stopwatch: stamps `Frame.available_ns`.
             opener: opens a camera.
+            fewest: cameras at least; one is enough where no rig is needed.
         Raises:
             OperatorError: too few or too many cameras, an address twice, one that cannot be opened.
         """
-        _check_addresses(live_cameras)
+        _check_addresses(live_cameras, fewest)
         self.camera_count = len(live_cameras)
         self._monotonic = monotonic
         self._mailbox = Mailbox(len(live_cameras))
@@ -182,11 +184,11 @@ def _retrieved(capture: Capture) -> Image | None:
     return frozen_image(pixels) if done else None
 
 
-def _check_addresses(live_cameras: Sequence[LiveCamera]) -> None:
+def _check_addresses(live_cameras: Sequence[LiveCamera], fewest: int) -> None:
     addresses = [camera.address for camera in live_cameras]
-    if not MIN_CAMERAS <= len(addresses) <= MAX_CAMERAS:
+    if not fewest <= len(addresses) <= MAX_CAMERAS:
         raise OperatorError(
-            f"camera: {len(addresses)} addresses; {MIN_CAMERAS} to {MAX_CAMERAS} work, one a camera: camera:0,1"
+            f"camera: {len(addresses)} addresses; {fewest} to {MAX_CAMERAS} work, one a camera: camera:0,1"
         )
     for address in addresses:
         if addresses.count(address) > 1:

@@ -59,6 +59,7 @@ class VideoSource(ClosesOnExit):
         stopwatch: Stopwatch,
         start_ns: int = 0,
         expected: tuple[Camera, ...] | None = None,
+        fewest: int = MIN_CAMERAS,
     ) -> None:
         """Open the files.
 
@@ -67,12 +68,13 @@ class VideoSource(ClosesOnExit):
             stopwatch: stamps `Frame.available_ns`.
             start_ns: stream time at which every file starts [ns].
             expected: the rig's cameras, to refuse a file of another image size at its first frame.
+            fewest: files at least; one is enough where no rig is needed.
         Raises:
             OperatorError: too few or too many files, or one that is missing or no video.
         """
-        if not MIN_CAMERAS <= len(paths) <= MAX_CAMERAS:
+        if not fewest <= len(paths) <= MAX_CAMERAS:
             raise OperatorError(
-                f"video: {len(paths)} files; {MIN_CAMERAS} to {MAX_CAMERAS} work, one a camera: video:LEFT,RIGHT"
+                f"video: {len(paths)} files; {fewest} to {MAX_CAMERAS} work, one a camera: video:LEFT,RIGHT"
             )
         for path in paths:
             if not path.is_file():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from bridge.pack import Encoder, Identity, Reader, enum, make_message
+from bridge.dialect import Encoder, Identity, Reader, enum, make_message
 from bridge.wire import FieldValue, Message, Received
 
 BASE_NS = 5_000_000_000

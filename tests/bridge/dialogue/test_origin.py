@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from bridge.dialect import enum
 from bridge.dialogue.origin import DO_SET_GLOBAL_ORIGIN, Origin, OriginKeeper, OriginState
 from bridge.dialogue.peer import Autopilot, Peer
-from bridge.pack import enum
 from bridge.wire import Message
 from tests.bridge.dialogue.far_autopilot import BASE_NS, from_autopilot
 

@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from bridge.dialect import enum, frame_bytes, message_id
 from bridge.dialogue import Dialogue, Terms
 from bridge.dialogue.peer import Autopilot, Peer
 from bridge.dialogue.streams import ANSWER_NS, REST_NS, StreamKeeper, Wanted
 from bridge.links import line_bytes_s
-from bridge.pack import enum, frame_bytes, message_id
 from bridge.wire import Message
 from tests.bridge.dialogue.far_autopilot import BASE_NS, beat, from_autopilot
 from tracker.types import TrackState

@@ -6,7 +6,7 @@ import struct
 
 from pymavlink.dialects.v20 import ardupilotmega
 
-from bridge.pack import Encoder, Identity, Reader
+from bridge.dialect import Encoder, Identity, Reader
 from bridge.wire import Message, Received
 
 _speaker = ardupilotmega.MAVLink(None, srcSystem=1, srcComponent=1)

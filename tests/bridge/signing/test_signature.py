@@ -9,10 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega
 
+from bridge.dialect import Encoder, Identity, Reader, make_message
 from bridge.dialogue import Terms
 from bridge.links import MemoryLink, open_link
 from bridge.outlet import Outlet, Spout
-from bridge.pack import Encoder, Identity, Packer, Reader, heartbeat, make_message
+from bridge.pack import Packer, heartbeat
 from bridge.signing import Signing
 from bridge.signing.stamps import Stamps
 from tests.bridge.estimates import estimate, step

@@ -6,7 +6,7 @@ import select
 from collections.abc import Mapping
 from time import monotonic_ns
 
-from bridge.pack import Encoder, Identity, Reader, enum, make_message, message_id
+from bridge.dialect import Encoder, Identity, Reader, enum, make_message, message_id
 from bridge.wire import FieldValue, Message, Received
 from tests.contracts.far_ends import FarEnd
 

@@ -6,12 +6,13 @@ import os
 from pathlib import Path
 from time import perf_counter_ns
 
+from bridge.dialect import Encoder, Identity, Reader, make_message
 from bridge.dialogue import Origin, Terms
 from bridge.dialogue.streams import Wanted
 from bridge.links import MemoryLink, open_link
 from bridge.log.reader import LogReader
 from bridge.outlet import Outlet, Spout
-from bridge.pack import Encoder, Identity, Packer, Reader, make_message
+from bridge.pack import Packer
 from bridge.signing import Signing
 from bridge.signing.stamps import Stamps
 from tests.bridge.tlogs import frames_in

@@ -10,9 +10,9 @@ from time import monotonic_ns
 
 import pytest
 
+from bridge.dialect import Reader
 from bridge.dialogue import Origin, Terms
 from bridge.dialogue.origin import OriginState
-from bridge.pack import Reader
 from tests.contracts.far_ends import FarEnd, PacedSerialFar, SerialFar, TcpFar, UdpCaller, UdpFar
 from tests.system.staying_up.autopilot import StandIn
 from tests.system.staying_up.flight import Flight, Plan, until

@@ -9,7 +9,7 @@ from typing import Self
 
 import numpy as np
 
-from bridge.pack import Encoder, Identity, Reader, make_message
+from bridge.dialect import Encoder, Identity, Reader, make_message
 from bridge.wire import FieldValue, Received
 from tools.simulate.autopilot.imu import Increment
 from tools.simulate.autopilot.parameters import FOR_VISION

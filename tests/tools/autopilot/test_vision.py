@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from bridge.pack import Encoder, Identity, Reader, make_message
+from bridge.dialect import Encoder, Identity, Reader, make_message
 from bridge.wire import FieldValue, Received
 from tools.simulate.autopilot.jitter import MESSAGES, MOST_LAG_US, JitterCorrection
 from tools.simulate.autopilot.parameters import FOR_VISION, Parameters

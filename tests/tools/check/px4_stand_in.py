@@ -11,7 +11,7 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from bridge.pack import Identity, enum, make_message
+from bridge.dialect import Identity, enum, make_message
 from bridge.wire import FieldValue, Message, Received
 from tools.simulate.autopilot.imu import Increment
 from tools.simulate.autopilot.port import Port

@@ -8,10 +8,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from bridge.dialect import Encoder, Identity, make_message
 from bridge.dialogue import Origin, Terms
 from bridge.links import MemoryLink, open_link
 from bridge.outlet import Outlet, Spout
-from bridge.pack import Encoder, Identity, Packer, make_message
+from bridge.pack import Packer
 from bridge.preflight.preflight import Given, Preflight
 from bridge.preflight.verdict import Line, Mark, Section, Write
 from tests.tools.check.hand import Hand

@@ -14,7 +14,8 @@ import scipy.io
 from evo.tools import file_interface
 from pymavlink import mavutil
 
-from bridge.pack import Encoder, Identity, heartbeat
+from bridge.dialect import Encoder, Identity
+from bridge.pack import heartbeat
 from tests.bridge.recordings import record, turns
 from tests.tools.export.flights import MS, START_NS, Line, S, clock, every, poses, received, servo, timesync, write
 from tools.export.export import ExportTerms, export

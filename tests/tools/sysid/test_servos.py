@@ -9,7 +9,7 @@ import pytest
 
 from bridge.log.received import NO_TIME
 from bridge.settings import load_settings
-from bridge.settings.models import ServoSettings, VehicleSettings
+from bridge.settings.vehicle import ServoSettings, VehicleSettings
 from tools.sysid.servo_clock import WRAP_NS, on_stream_clock
 from tools.sysid.servos import sticks_of
 from tracker.errors import OperatorError

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import socket
 
-from bridge.pack import Encoder, Identity, Reader
+from bridge.dialect import Encoder, Identity, Reader
 from bridge.wire import Message, Received
 from tools.simulate.autopilot.jitter import JitterCorrection
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from bridge.pack import enum, make_message
+from bridge.dialect import enum, make_message
 from bridge.wire import FieldValue, Message
 from tools.simulate.autopilot.imu import Increment
 from tools.simulate.autopilot.navigation import Navigation, NavState

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 from typing import Protocol
 
-from bridge.pack import enum, make_message
+from bridge.dialect import enum, make_message
 from bridge.wire import FieldValue, Message, Received
 from tools.simulate.autopilot.origins import Origin
 from tools.simulate.autopilot.parameters import Parameter, Parameters

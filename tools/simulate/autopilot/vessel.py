@@ -7,7 +7,8 @@ from enum import StrEnum
 
 import numpy as np
 
-from bridge.pack import HEARTBEAT, Identity, enum, make_message
+from bridge.dialect import Identity, enum, make_message
+from bridge.pack import HEARTBEAT
 from tools.simulate.autopilot import requests
 from tools.simulate.autopilot.arming import refusals
 from tools.simulate.autopilot.failsafe import EkfFailsafe

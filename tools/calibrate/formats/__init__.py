@@ -1,0 +1,1 @@
+"""Files that hold calibrated cameras, ours and other programs'."""

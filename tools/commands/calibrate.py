@@ -1,0 +1,101 @@
+"""`posebridge calibrate`: boards, cameras, and files of other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from tools.commands.common import ConfigOption, JsonOption, clocks_of
+
+EXIT_CALIBRATION_NOT_GOOD = 1
+
+calibrate = typer.Typer(help="Calibrate cameras: print a board, find intrinsics, convert files (docs/calibrate.md).")
+
+KindOption = Annotated[str, typer.Option("--board", help="charuco or chessboard.", metavar="KIND")]
+CornersOption = Annotated[str, typer.Option(help="Inner corners of the board, as OpenCV counts them.", metavar="CxR")]
+DictionaryOption = Annotated[str, typer.Option(help="The markers' dictionary, by OpenCV's name.", metavar="NAME")]
+OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace files that exist.")]
+MarkerOption = Annotated[
+    float | None, typer.Option("--marker_mm", "--marker-mm", help="A marker's side; 0.75 squares if left out.")
+]
+
+
+@calibrate.command()
+def board(
+    out: Annotated[Path, typer.Option(help="The sheet to write.", metavar="FILE.pdf")],
+    kind: KindOption = "charuco",
+    corners: CornersOption = "9x6",
+    paper: Annotated[str, typer.Option(help="A4 or A3.")] = "A4",
+    square_mm: Annotated[
+        float | None, typer.Option("--square_mm", "--square-mm", help="A square's side; the largest if left out.")
+    ] = None,
+    marker_mm: MarkerOption = None,
+    dictionary: DictionaryOption = "4X4_50",
+    overwrite: OverwriteOption = False,
+) -> None:
+    """Print a board as a PDF at its own size, with a ruler to check the print."""
+    from tools.calibrate.command import BoardRequest, print_board
+
+    request = BoardRequest(out, kind, corners, paper, square_mm, marker_mm, dictionary, overwrite)
+    typer.echo(print_board(request))
+
+
+@calibrate.command()
+def convert(
+    file: Annotated[Path, typer.Argument(help="TOML, Kalibr, ROS, EuRoC or OpenCV; or a folder with mav0.")],
+    out: Annotated[Path, typer.Argument(help="The file to write; a folder for several cameras as ROS or EuRoC.")],
+    to: Annotated[
+        str | None, typer.Option(help="toml, kalibr, ros, euroc or opencv; .toml needs no asking.", metavar="FORMAT")
+    ] = None,
+    size: Annotated[
+        str | None, typer.Option(help="Image size, for OpenCV files that do not tell.", metavar="WxH")
+    ] = None,
+    overwrite: OverwriteOption = False,
+) -> None:
+    """Turn one calibration file into another; what the new one cannot hold is said on stderr."""
+    from tools.calibrate.command import ConvertRequest, convert_file
+
+    for line in convert_file(ConvertRequest(file, out, to, size, overwrite)):
+        typer.echo(f"posebridge: {line}", err=True)
+
+
+@calibrate.command()
+def intrinsics(
+    context: typer.Context,
+    config: ConfigOption = "lab",
+    source: Annotated[
+        str, typer.Option(help="images:LEFT*.png,RIGHT*.png (a glob or folder a camera), or as for run.", metavar="URI")
+    ] = "camera:0,1",
+    kind: KindOption = "charuco",
+    corners: CornersOption = "9x6",
+    square_mm: Annotated[
+        float, typer.Option("--square_mm", "--square-mm", help="A square's side, measured on the print.")
+    ] = 25.0,
+    marker_mm: MarkerOption = None,
+    dictionary: DictionaryOption = "4X4_50",
+    coefficients: Annotated[int, typer.Option(help="Of lens distortion: 4, 5 or 8.")] = 5,
+    distance_m: Annotated[
+        float, typer.Option("--distance_m", "--distance-m", help="From a camera to where is flown.")
+    ] = 3.2,
+    out: Annotated[
+        Path | None, typer.Option(help="Write the cameras here, as [[rig.cameras]].", metavar="FILE")
+    ] = None,
+    to: Annotated[str | None, typer.Option(help="Another format for it, as for convert.", metavar="FORMAT")] = None,
+    picture: Annotated[Path | None, typer.Option(help="Draw coverage and errors here.", metavar="FILE.png")] = None,
+    overwrite: OverwriteOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Find each camera's lens, and how well it is known, from views of a board.
+
+    Exit code 0: good. 1: not good, with the reasons. 2: no board, too few views, or other bad input.
+    """
+    from tools.calibrate.board import make_board
+    from tools.calibrate.command import kind_of
+    from tools.calibrate.session import IntrinsicsRequest, run_intrinsics
+
+    board = make_board(kind_of(kind), corners, square_mm, marker_mm, dictionary)
+    request = IntrinsicsRequest(config, source, board, coefficients, distance_m, out, to, picture, overwrite, json)
+    if not run_intrinsics(request, clocks_of(context)).good:
+        raise typer.Exit(EXIT_CALIBRATION_NOT_GOOD)

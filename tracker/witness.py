@@ -1,0 +1,35 @@
+"""A ball that comes back from hiding, and who bears it out.
+
+While a ball is hidden the turn about the other two is open, and whatever has its colour near where it may be fits. What
+one camera sees there and another, which sees the other balls, does not, may be half a ball or two things in one: it is
+taken with the doubt of such a spot's middle.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from tracker.state import ATTITUDE, State
+from tracker.types import BallSighting, frozen_array
+
+OPEN_RAD = 0.005  # one sigma of attitude: well beyond what three balls leave
+DOUBT_PX = 1.5  # one sigma: half a ball's radius and more
+
+
+def doubted_alone(sightings: Sequence[BallSighting], last: State | None) -> tuple[BallSighting, ...]:
+    """Return the sightings of one instant; while a turn is open, less sure where a second camera should bear them out.
+
+    last: what the sightings before left known; None while nothing is tracked.
+    """
+    cameras = {sighting.camera for sighting in sightings}
+    if last is None or len(cameras) < 2 or float(last.P.diagonal()[ATTITUDE].max()) < OPEN_RAD**2:
+        return tuple(sightings)
+    seen = [sighting.ball for sighting in sightings]
+    return tuple(_doubted(one) if seen.count(one.ball) == 1 else one for one in sightings)
+
+
+def _doubted(sighting: BallSighting) -> BallSighting:
+    return replace(sighting, cov_px=frozen_array(sighting.cov_px + DOUBT_PX**2 * np.eye(2)))
