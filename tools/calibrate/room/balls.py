@@ -30,7 +30,8 @@ def find_balls(frame: Frame, rig: Rig) -> Array | None:
     must look: of what else has their colours hardly anything has both.
 
     Returns:
-        (n, 2) sub-pixel centres; None when not every ball is there.
+        (n, 3): of each ball the sub-pixel centre u, v and what it is known to, one sigma [px]; None when not every
+        ball is there.
     """
     camera = rig.cameras[frame.camera]
     blobs = [[b for b in of if b.area_px >= LEAST_AREA_PX] for of in look_everywhere(frame, camera, rig)]
@@ -59,12 +60,17 @@ def _depth_m(uv_px: Array, points_inB: Array, camera: Camera) -> float | None:
 
 
 def _centres(frame: Frame, rig: Rig, blobs: Sequence[Blob], depth_m: float) -> Array | None:
-    centres = np.empty((len(blobs), 2))
+    centres = np.empty((len(blobs), 3))
     for k, (blob, ball) in enumerate(zip(blobs, rig.marker.balls, strict=True)):
         radius_px = rig.cameras[frame.camera].focal_px * ball.radius_m / depth_m
         u, v = blob.uv_px.tolist()
         fit = fit_centre(frame.image, Expected((u, v), radius_px, (0.0, 0.0), FLAT, Response()))
         if not isinstance(fit, Centre):
             return None
-        centres[k] = fit.uv_px
+        centres[k] = *fit.uv_px, sigma_px(fit)
     return centres
+
+
+def sigma_px(fit: Centre) -> float:
+    """Return what a centre is known to by its image alone, one sigma on each axis [px]."""
+    return math.sqrt(float(np.trace(fit.cov_px)) / 2.0)

@@ -1,19 +1,16 @@
-"""Footage of the waved marker: looked at once without knowing where the cameras stand, and again once it is known."""
+"""Footage of the waved marker, looked at without knowing where the cameras stand."""
 
 from __future__ import annotations
 
-from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable
+from dataclasses import dataclass
 
 import numpy as np
 
 from tools.calibrate.room.balls import find_balls
 from tools.calibrate.room.tracks import Track, track_of
-from tracker.pipeline import Tracker
 from tracker.rig import Rig
-from tracker.tuning import Tuning
-from tracker.types import Array, BallSighting, Event, Frame, Image
+from tracker.types import Array, Event, Frame, Image
 
 AROUND_PX = 24  # kept around the balls, for the second look
 PATIENCE_NS = 10_000_000_000
@@ -21,10 +18,14 @@ PATIENCE_NS = 10_000_000_000
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Clip:
-    """The part of an image with the balls in it. left, top: where it was [px].  t_ns: the camera's stamp."""
+    """The part of an image with the balls in it. t_ns: the camera's stamp.  left, top: where it was [px].
+
+    centres_px (balls, 3): where the first look found the balls in the whole image, u, v, one sigma [px].
+    """
 
     camera: int
     t_ns: int
+    centres_px: Array
     left: int
     top: int
     image: Image
@@ -75,39 +76,6 @@ def watch(events: Iterable[Event], rig: Rig, longest_s: float) -> Footage:
 
 
 def _clip(frame: Frame, centres: Array) -> Clip:
-    left, top = (max(0, int(x) - AROUND_PX) for x in centres.min(axis=0))
-    right, bottom = (int(x) + AROUND_PX for x in centres.max(axis=0))
-    return Clip(frame.camera, frame.t_ns, left, top, frame.image[top:bottom, left:right].copy())
-
-
-def looked_again(footage: Footage, rig: Rig, tuning: Tuning) -> tuple[Track, ...]:
-    """Follow the marker through the kept clips with cameras that are known by now.
-
-    The tracker learns how each camera shows a ball: its light, blur and shutter. A fit that does not know them is
-    drawn a tenth of a pixel or two towards the light, everywhere alike, which turns cameras and stretches rooms.
-    """
-    tracker = Tracker(rig, replace(tuning, tilt_limit_rad=np.pi), lambda: 0)
-    sightings: list[BallSighting] = []
-    for clip in sorted(footage.clips, key=lambda one: one.t_ns + rig.cameras[one.camera].clock_offset_ns):
-        camera = rig.cameras[clip.camera]
-        sightings += tracker.step(clip.frame(camera.width_px, camera.height_px)).sightings
-    sightings += tracker.finish().sightings
-    return tracks_of(sightings, rig, footage.start_ns)
-
-
-def tracks_of(sightings: Iterable[BallSighting], rig: Rig, start_ns: int) -> tuple[Track, ...]:
-    """Return each camera's track of those frames in which it saw every ball; times count from start_ns."""
-    frames: dict[tuple[int, int], dict[int, Array]] = defaultdict(dict)
-    for one in sightings:
-        frames[one.camera, one.t_ns][one.ball] = one.uv_px
-    found = [list(_whole(frames, camera, len(rig.marker), start_ns)) for camera in range(len(rig.cameras))]
-    return tuple(track_of(each, len(rig.marker)) for each in found)
-
-
-def _whole(
-    frames: dict[tuple[int, int], dict[int, Array]], wanted: int, balls: int, start_ns: int
-) -> Iterator[tuple[float, Array]]:
-    for (camera, t_ns), seen in frames.items():
-        if camera == wanted and len(seen) == balls:
-            centres: Sequence[Array] = [seen[ball] for ball in range(balls)]
-            yield (t_ns - start_ns) * 1e-9, np.stack(centres)
+    left, top = (max(0, int(x) - AROUND_PX) for x in centres[:, :2].min(axis=0))
+    right, bottom = (int(x) + AROUND_PX for x in centres[:, :2].max(axis=0))
+    return Clip(frame.camera, frame.t_ns, centres, left, top, frame.image[top:bottom, left:right].copy())

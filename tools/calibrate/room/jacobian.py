@@ -11,8 +11,8 @@ from scipy.sparse import csr_array
 from tools.calibrate.room.scene import Indices, Scene, Seen
 from tracker.types import Array
 
-POSE, CAMERA = 6, 7
-OFFSET_SIGMA_S, FOCAL_SIGMA, BALL_SIGMA_M = 0.05, 0.02, 0.02  # what is known beforehand
+POSE, CAMERA, LENS = 6, 7, 3
+OFFSET_SIGMA_S, FOCAL_SIGMA, CENTRE_SIGMA_PX, BALL_SIGMA_M = 0.05, 0.005, 3.0, 0.02  # what is known beforehand
 WEAK = 1e-9  # keeps what nothing tells from making the equations singular
 
 
@@ -20,36 +20,41 @@ WEAK = 1e-9  # keeps what nothing tells from making the equations singular
 class Layout:
     """Where each unknown stands in the vector of all.
 
-    First, of each camera but 0: position (3) [m], turn (3) [rad], clock offset [s]. Then, if focal, the logarithm of
-    each camera's focal length; if marker, each ball's place in B (3) [m]; then of each instant the marker's position
-    (3) and turn (3).
+    First, of each camera but 0: position (3) [m], turn (3) [rad], clock offset [s]. Then, if lenses, of each camera: the
+    logarithm of its focal length and its centre (2) [px]; if marker, each ball's place in B (3) [m]; then of each
+    instant the marker's position (3) and turn (3).
     """
 
     cameras: int
     balls: int
     instants: int
-    focal: bool = False
+    lenses: bool = False
     marker: bool = False
 
     def camera(self, c: int) -> slice:
         """Return where camera c >= 1 stands."""
         return slice(CAMERA * (c - 1), CAMERA * c)
 
-    def focal_at(self, c: int) -> int:
-        """Return where the focal length of camera c stands."""
-        return CAMERA * (self.cameras - 1) + c
+    def lens(self, c: int) -> slice:
+        """Return where the lens of camera c stands."""
+        start = CAMERA * (self.cameras - 1) + LENS * c
+        return slice(start, start + LENS)
 
     @property
     def marker_at(self) -> slice:
         """Return where the balls stand."""
-        start = CAMERA * (self.cameras - 1) + self.focal * self.cameras
+        start = CAMERA * (self.cameras - 1) + LENS * self.cameras * self.lenses
         return slice(start, start + 3 * self.balls)
 
     @property
     def globals(self) -> int:
         """Return how many unknowns come before the marker's poses."""
-        poses = CAMERA * (self.cameras - 1) + self.focal * self.cameras
-        return poses + 3 * self.balls * self.marker
+        return int(self.marker_at.start) + 3 * self.balls * self.marker
+
+    @property
+    def kinds(self) -> int:
+        """Return how many kinds of sightings there are: each ball in each camera."""
+        return self.cameras * self.balls
 
     @property
     def size(self) -> int:
@@ -61,8 +66,8 @@ class Layout:
         prior = np.full(self.size, WEAK)
         for c in range(1, self.cameras):
             prior[self.camera(c)][6] = OFFSET_SIGMA_S**-2
-        if self.focal:
-            prior[self.focal_at(0) : self.focal_at(self.cameras)] = FOCAL_SIGMA**-2
+        for c in range(self.cameras * self.lenses):
+            prior[self.lens(c)] = FOCAL_SIGMA**-2, CENTRE_SIGMA_PX**-2, CENTRE_SIGMA_PX**-2
         if self.marker:
             prior[self.marker_at] = BALL_SIGMA_M**-2
         return prior
@@ -72,8 +77,9 @@ class Layout:
         values = np.zeros(self.size)
         for c in range(1, self.cameras):
             values[self.camera(c)][6] = scene.offsets_s[c]
-        if self.focal:
-            values[self.focal_at(0) : self.focal_at(self.cameras)] = [np.log(x.focal_px) for x in scene.cameras]
+        for c in range(self.cameras * self.lenses):
+            camera = scene.cameras[c]
+            values[self.lens(c)] = np.log(camera.focal_px), camera.K[0, 2], camera.K[1, 2]
         if self.marker:
             values[self.marker_at] = scene.points_inB.reshape(-1)
         return values
@@ -120,8 +126,10 @@ def _by_unknown(scene: Scene, seen: Seen, layout: Layout, c: int, instants: Indi
         speed = seen.speed[c, instants].reshape(-1, 2, 1)
         columns = np.broadcast_to(np.arange(CAMERA) + layout.camera(c).start, (len(x_inW), CAMERA))
         yield columns, np.concatenate((-Ju, turn, speed), axis=2)
-    if layout.focal:
-        yield np.full((len(x_inW), 1), layout.focal_at(c)), (expected - camera.K[:2, 2])[:, :, None]
+    if layout.lenses:
+        by_focal = (expected - camera.K[:2, 2])[:, :, None]
+        columns = np.broadcast_to(np.arange(LENS) + layout.lens(c).start, (len(x_inW), LENS))
+        yield columns, np.concatenate((by_focal, np.broadcast_to(np.eye(2), (len(x_inW), 2, 2))), axis=2)
     if layout.marker:
         yield layout.marker_at.start + 3 * np.tile(np.arange(n), len(instants))[:, None] + np.arange(3), JR
 

@@ -40,12 +40,14 @@ class Seen:
 
     t_s (m,): the instants by camera 0's clock [s].  offsets_s (cameras,): the clock offsets that they were taken for.
     uv_px, speed (cameras, m, balls, 2): centres [px] and their speeds [px/s]; NaN where a camera did not see.
+    sigma_px (cameras, m, balls): what each centre is known to by its image alone, one sigma [px].
     """
 
     t_s: Array
     offsets_s: Array
     uv_px: Array
     speed: Array
+    sigma_px: Array
 
     def at(self, offsets_s: Array) -> Array:
         """Return the centres (cameras, m, balls, 2) if the clocks had other offsets, to first order [px]."""
@@ -59,17 +61,23 @@ class Seen:
 
     def only(self, chosen: NDArray[np.bool_] | Indices) -> Seen:
         """Return some of the instants."""
-        return Seen(self.t_s[chosen], self.offsets_s, self.uv_px[:, chosen], self.speed[:, chosen])
+        return Seen(
+            self.t_s[chosen], self.offsets_s, self.uv_px[:, chosen], self.speed[:, chosen], self.sigma_px[:, chosen]
+        )
 
 
 def seen_at(tracks: Sequence[Track], t_s: Array, offsets_s: Array) -> Seen:
     """Return what the cameras saw at instants (m,), each by its own clock."""
-    both = [track.at(t_s - offset) for track, offset in zip(tracks, offsets_s.tolist(), strict=True)]
-    return Seen(t_s, offsets_s, np.stack([uv for uv, _ in both]), np.stack([speed for _, speed in both]))
+    each = [track.at(t_s - offset) for track, offset in zip(tracks, offsets_s.tolist(), strict=True)]
+    uv_px, speed, sigma_px = (np.stack(values) for values in zip(*each, strict=True))
+    return Seen(t_s, offsets_s, uv_px, speed, sigma_px)
 
 
 def common_instants(tracks: Sequence[Track], most: int, offsets_s: Array) -> Seen:
-    """Return what was seen at up to `most` instants, spread evenly over those at which two cameras or more saw."""
+    """Return what was seen at up to `most` instants at which two cameras or more saw, spread evenly over the way.
+
+    The way, not the time: a marker that stands still shows the same errors over and over.
+    """
     spans = [(float(track.t_s[0]), float(track.t_s[-1])) for track in tracks if len(track)]
     if not spans:
         return seen_at(tracks, np.empty(0), offsets_s)
@@ -77,5 +85,8 @@ def common_instants(tracks: Sequence[Track], most: int, offsets_s: Array) -> See
     period_s = min(float(np.median(np.diff(track.t_s))) for track in tracks if len(track) > 1)
     seen = seen_at(tracks, np.arange(start_s, end_s, period_s), offsets_s)
     seen = seen.only(seen.there.sum(axis=0) >= 2)
-    count = len(seen.t_s)
-    return seen if count <= most else seen.only(np.linspace(0, count - 1, most).round().astype(np.int64))
+    if len(seen.t_s) <= most:
+        return seen
+    way_px = np.cumsum(np.nanmean(np.linalg.norm(seen.speed, axis=3), axis=(0, 2)))
+    chosen = np.searchsorted(way_px, np.linspace(way_px[0], way_px[-1], most), side="left")
+    return seen.only(np.unique(chosen))

@@ -1,7 +1,7 @@
 """Footage in, cameras out.
 
 tracks of the balls -> pairs of cameras, joined -> bundle adjustment, twice: the clocks move the sightings
-                    -> the same images again, by a tracker that knows the cameras by now -> bundle adjustment
+                    -> the same images again, by who knows the cameras by now -> bundle adjustment
 """
 
 from __future__ import annotations
@@ -10,65 +10,86 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
+from tools.calibrate.room.again import looked_again
 from tools.calibrate.room.bundle import Adjusted, adjust
-from tools.calibrate.room.footage import Footage, looked_again
+from tools.calibrate.room.footage import Footage
 from tools.calibrate.room.gauge import aligned
 from tools.calibrate.room.jacobian import Layout
-from tools.calibrate.room.scene import Seen, common_instants, seen_at
+from tools.calibrate.room.scene import Scene, Seen, common_instants, seen_at
 from tools.calibrate.room.start import first_scene, marker_way
 from tools.calibrate.room.tracks import Track
 from tracker.camera import Camera
 from tracker.rig import Rig, make_rig
-from tracker.tuning import Tuning
 from tracker.types import Array
 
-MOST_INSTANTS = 200
+MOST_INSTANTS = 400
 ROUNDS = 2  # of adjustment: the first finds the clocks, the second takes the sightings at the right instants
+STRETCH_S, STRETCHES = 2.0, 5  # of every five stretches of two seconds the last is held out, to judge by
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Found:
     """What the footage told.
 
-    cameras: in the frame of the cameras that were given, their clock offsets in them.
-    adjusted: the last adjustment, in the same frame.  seen: what it went by.
+    cameras: in the frame of the cameras that were given, their clock offsets in them.  scene: in the same frame.
+    adjusted: the last adjustment, in a frame of its own, in which camera 0 was not moved.
+    seen: what it went by.  held_out: what was kept from it.  tracks: of the whole footage, on the clocks of `seen`.
     """
 
     cameras: tuple[Camera, ...]
+    scene: Scene
     adjusted: Adjusted
     seen: Seen
+    held_out: Seen
+    tracks: tuple[Track, ...]
 
 
-def find_cameras(footage: Footage, rig: Rig, tuning: Tuning) -> Found:
+def find_cameras(footage: Footage, rig: Rig, *, lenses: bool = False) -> Found:
     """Find where the cameras stand and by how much their clocks differ.
 
     Args:
         footage: of the marker waved through the room.
         rig: intrinsics and marker as they are; the cameras' poses say only which frame the result is to be in.
-        tuning: the tracker's, for the second look.
+        lenses: refine focal lengths and centres too, within what a good calibration of lenses leaves open.
     Raises:
         OperatorError: too few instants that two cameras share, or sightings that do not fit together.
     """
-    seen = common_instants(footage.tracks, MOST_INSTANTS, np.zeros(len(rig.cameras)))
+    none = np.zeros(len(rig.cameras))
+    seen = common_instants(footage.tracks, MOST_INSTANTS, none)
     scene, seen = first_scene(seen, rig)
-    roughly = _adjusted(footage.tracks, seen.t_s, scene.cameras, scene.offsets_s, rig, rig.cameras)
-    tracks = looked_again(footage, make_rig(roughly.cameras, rig.marker), tuning)
-    none = np.zeros(len(rig.cameras))  # the tracker's stamps have the offsets found so far in them
+    roughly = refined(footage.tracks, seen.t_s, scene, rig)
+    tracks = looked_again(footage, make_rig(roughly.cameras, rig.marker))
     t_s = common_instants(tracks, MOST_INSTANTS, none).t_s
-    return _adjusted(tracks, t_s, roughly.cameras, none, rig, roughly.cameras)
+    known = replace(roughly.scene, cameras=roughly.cameras, offsets_s=none)  # the tracks have the clocks in them by now
+    return refined(tracks, t_s, known, make_rig(roughly.cameras, rig.marker), lenses=lenses)
 
 
-def _adjusted(
-    tracks: Sequence[Track], t_s: Array, cameras: tuple[Camera, ...], offsets_s: Array, rig: Rig,
-    stamped: tuple[Camera, ...],
-) -> Found:  # fmt: skip
-    """Adjust, and give cameras in the frame of the rig's. stamped: whose clock offsets are in the tracks' times."""
+def refined(tracks: Sequence[Track], t_s: Array, guess: Scene, rig: Rig, *, lenses: bool = False) -> Found:
+    """Adjust cameras and clocks to what was seen at some instants but the held out ones.
+
+    Args:
+        tracks: each camera's sightings, by its stamps and the clock offset that the rig has for it.
+        t_s (m,): instants [s].
+        guess: cameras and clocks that are about right; its marker's poses do not matter.
+        rig: the marker, the frame of the result, and the clock offsets that are in the tracks.
+        lenses: adjust focal lengths and centres too.
+    """
+    kept, cameras, offsets_s = t_s[~is_held_out(t_s)], guess.cameras, guess.offsets_s
     for _ in range(ROUNDS):
-        scene, seen = marker_way(seen_at(tracks, t_s, offsets_s), cameras, offsets_s, rig)
-        result = adjust(scene, seen, Layout(len(cameras), len(rig.marker), len(seen.t_s)))
+        scene, seen = marker_way(seen_at(tracks, kept, offsets_s), cameras, offsets_s, rig)
+        result = adjust(scene, seen, Layout(len(cameras), len(rig.marker), len(seen.t_s), lenses))
         cameras, offsets_s = result.scene.cameras, result.scene.offsets_s
     scene = aligned(result.scene, rig.cameras)
-    offsets_ns = (round(x * 1e9) + camera.clock_offset_ns for x, camera in zip(offsets_s, stamped, strict=True))
-    timed = tuple(replace(c, clock_offset_ns=ns) for c, ns in zip(scene.cameras, offsets_ns, strict=True))
-    return Found(timed, replace(result, scene=replace(scene, cameras=timed)), seen)
+    timed = tuple(
+        replace(camera, clock_offset_ns=said.clock_offset_ns + round(offset_s * 1e9))
+        for camera, said, offset_s in zip(scene.cameras, rig.cameras, offsets_s.tolist(), strict=True)
+    )
+    held_out = seen_at(tracks, t_s[is_held_out(t_s)], offsets_s)
+    return Found(timed, scene, result, seen, held_out, tuple(tracks))
+
+
+def is_held_out(t_s: Array) -> NDArray[np.bool_]:
+    """Say which instants (m,) are not for the fit but to judge it by."""
+    return np.asarray((t_s // STRETCH_S) % STRETCHES == STRETCHES - 1)

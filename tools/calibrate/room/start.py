@@ -86,11 +86,19 @@ def triangulated(seen: Seen, cameras: tuple[Camera, ...], offsets_s: Array) -> A
     Source: `tracker.triangulate`, eq. 1.
     """
     uv = seen.at(offsets_s)
-    shape = uv.shape[1:3]
+    cameras_count, instants, balls, _ = uv.shape
+    return triangulated_from(uv.reshape(cameras_count, instants * balls, 2), cameras).reshape(instants, balls, 3)
+
+
+def triangulated_from(uv_px: Array, cameras: tuple[Camera, ...]) -> Array:
+    """Return the places (n, 3) [m] of points seen at uv_px (cameras, n, 2), NaN where not; see `triangulated`."""
+    shape = uv_px.shape[1:2]
     A, b, count = np.zeros((*shape, 3, 3)), np.zeros((*shape, 3)), np.zeros(shape)
     for c, camera in enumerate(cameras):
-        there = np.isfinite(uv[c]).all(axis=2)
-        rays = camera.bearings(uv[c][there]) @ camera.R_CtoW.T
+        there = np.isfinite(uv_px[c]).all(axis=1)
+        if not there.any():
+            continue
+        rays = camera.bearings(uv_px[c][there]) @ camera.R_CtoW.T
         M = np.eye(3) - rays[:, :, None] * rays[:, None, :]
         A[there] += M
         b[there] += M @ camera.p_CinW
@@ -133,7 +141,7 @@ def _join(seen: Seen, rig: Rig, a: int, b: int) -> _Pair:
     turn, shift = cv2.recoverPose(E, x[0][inlier], x[1][inlier], np.eye(3))[1:3]
     R, t = np.asarray(turn, dtype=np.float64), np.asarray(shift, dtype=np.float64)[:, 0]
     unit = placed(rig.cameras[a], np.eye(3), np.zeros(3)), placed(rig.cameras[b], R.T, -R.T @ t)
-    pair = Seen(both.t_s, both.offsets_s[[a, b]], both.uv_px[[a, b]], both.speed[[a, b]])
+    pair = Seen(both.t_s, both.offsets_s[[a, b]], both.uv_px[[a, b]], both.speed[[a, b]], both.sigma_px[[a, b]])
     points = triangulated(pair, unit, pair.offsets_s + np.array([0.0, offset_s]))
     scale = float(np.median(sides(rig.marker.points_inB) / sides(points)))
     return _Pair(R, scale * t, offset_s)

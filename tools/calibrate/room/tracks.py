@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from tracker.types import Array
+from tracker.rig import Rig
+from tracker.types import Array, BallSighting
 
 GAP = 1.6  # of the median frame period: more is a gap, over which nothing is interpolated
 MOST_APART_S = 0.12  # cameras of 10 Hz are taken, slower ones miss too much of a wave
@@ -15,25 +18,29 @@ MOST_APART_S = 0.12  # cameras of 10 Hz are taken, slower ones miss too much of 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """One camera's sightings in order of time. t_s (n,): stamps [s].  uv_px (n, balls, 2): centres [px]."""
+    """One camera's sightings in order of time.
+
+    t_s (n,): stamps [s].  uv_px (n, balls, 2): centres [px].  sigma_px (n, balls): what each is known to, one sigma.
+    """
 
     t_s: Array
     uv_px: Array
+    sigma_px: Array
 
     def __len__(self) -> int:
         return len(self.t_s)
 
-    def at(self, t_s: Array) -> tuple[Array, Array]:
+    def at(self, t_s: Array) -> tuple[Array, Array, Array]:
         """Return where the balls were at stamps t_s (m,), and how fast they moved.
 
         Returns:
-            uv_px (m, balls, 2) and speed (m, balls, 2) [px/s]; NaN where not two frames on either side follow each
-            other without a gap.
+            uv_px (m, balls, 2), speed (m, balls, 2) [px/s] and sigma_px (m, balls) of the centres; NaN where not two
+            frames on either side follow each other without a gap.
         Source: Lagrange's cubic through four frames; at 30 Hz its error for 1 Hz waves of 100 px is below 0.01 px.
         """
         nowhere = np.full((len(t_s), *self.uv_px.shape[1:]), np.nan)
         if len(self) < 4:
-            return nowhere, nowhere.copy()
+            return nowhere, nowhere.copy(), nowhere[..., 0].copy()
         first = np.clip(np.searchsorted(self.t_s, t_s, side="right") - 2, 0, len(self) - 4)
         four = first[:, None] + np.arange(4)
         T, x = self.t_s[four], t_s[:, None]
@@ -47,13 +54,35 @@ class Track:
         widest = min(MOST_APART_S, GAP * float(np.median(np.diff(self.t_s))))
         good = (steps.max(axis=1) <= widest) & (t_s >= T[:, 1] - 1e-6) & (t_s <= T[:, 2] + 1e-6)
         uv, speed = (np.einsum("mk,mkbi->mbi", weight, self.uv_px[four]) for weight in (value, slope))
-        uv[~good] = speed[~good] = np.nan
-        return uv, speed
+        sigma = np.sqrt(np.einsum("mk,mkb->mb", value**2, self.sigma_px[four] ** 2))
+        uv[~good] = speed[~good] = sigma[~good] = np.nan
+        return uv, speed, sigma
 
 
 def track_of(sightings: Iterable[tuple[float, Array]], balls: int) -> Track:
-    """Put sightings (stamp [s], centres (balls, 2)) in order of time; of two at one time the first counts."""
+    """Put sightings in order of time; of two at one time the first counts.
+
+    sightings: stamp [s], and u, v and one sigma of each ball (balls, 3) [px].
+    """
     ordered = sorted(sightings, key=lambda one: one[0])
     t_s, chosen = np.unique([one[0] for one in ordered], return_index=True)
-    uv_px = np.array([ordered[k][1] for k in chosen], dtype=np.float64).reshape(-1, balls, 2)
-    return Track(np.asarray(t_s, dtype=np.float64), uv_px)
+    centres = np.array([ordered[k][1] for k in chosen], dtype=np.float64).reshape(-1, balls, 3)
+    return Track(np.asarray(t_s, dtype=np.float64), centres[..., :2], centres[..., 2])
+
+
+def tracks_of(sightings: Iterable[BallSighting], rig: Rig, start_ns: int) -> tuple[Track, ...]:
+    """Return each camera's track of those frames in which it saw every ball; times count from start_ns."""
+    frames: dict[tuple[int, int], dict[int, Array]] = defaultdict(dict)
+    for one in sightings:
+        frames[one.camera, one.t_ns][one.ball] = np.append(one.uv_px, math.sqrt(np.trace(one.cov_px) / 2.0))
+    found = [list(_whole(frames, camera, len(rig.marker), start_ns)) for camera in range(len(rig.cameras))]
+    return tuple(track_of(each, len(rig.marker)) for each in found)
+
+
+def _whole(
+    frames: dict[tuple[int, int], dict[int, Array]], wanted: int, balls: int, start_ns: int
+) -> Iterator[tuple[float, Array]]:
+    for (camera, t_ns), seen in frames.items():
+        if camera == wanted and len(seen) == balls:
+            centres: Sequence[Array] = [seen[ball] for ball in range(balls)]
+            yield (t_ns - start_ns) * 1e-9, np.stack(centres)
