@@ -7,6 +7,7 @@ import numpy as np
 from tools.calibrate.room.bundle import Adjusted
 from tools.calibrate.room.gauge import LEVER_M
 from tools.calibrate.room.jacobian import CAMERA
+from tools.calibrate.room.scene import Scene
 from tools.calibrate.room.start import placed, triangulated_from
 from tracker.camera import Camera
 from tracker.types import Array
@@ -29,12 +30,16 @@ def camera_covariance(adjusted: Adjusted) -> Array:
     cameras = adjusted.scene.cameras
     bias_px = max(LEAST_BIAS_PX, adjusted.rms_px)
     poses = CAMERA * (len(cameras) - 1)
-    middle_m = float(np.mean([c.in_camera(adjusted.scene.p_BinW)[:, 2].mean() / c.focal_px for c in cameras]))
-    shifts = np.hstack((adjusted.shifts, middle_m * adjusted.by_marker))[:poses]
+    shifts = np.hstack((adjusted.shifts, metres_a_pixel(adjusted.scene) * adjusted.by_marker))[:poses]
     covariance = np.zeros((poses + CAMERA, poses + CAMERA))
     covariance[CAMERA:, CAMERA:] = adjusted.covariance[:poses, :poses] + bias_px**2 * shifts @ shifts.T
     D = _datum(cameras)
     return np.asarray(D @ covariance @ D.T)
+
+
+def metres_a_pixel(scene: Scene) -> float:
+    """Return how large a pixel is where the marker was, on the average [m/px]."""
+    return float(np.mean([camera.in_camera(scene.p_BinW)[:, 2].mean() / camera.focal_px for camera in scene.cameras]))
 
 
 def turned(covariance: Array, R: Array) -> Array:

@@ -22,9 +22,13 @@ def aligned(scene: Scene, cameras: Sequence[Camera]) -> Scene:
     Source: Kabsch's rigid motion between the cameras' places and points LEVER_M from them along their axes; two
         places alone would leave the turn about the line between them open.
     """
-    R, p = rigid(_points(scene.cameras), _points(cameras))
-    moved = tuple(placed(camera, R @ camera.R_CtoW, R @ camera.p_CinW + p) for camera in scene.cameras)
-    return replace(scene, cameras=moved, p_BinW=scene.p_BinW @ R.T + p, R_BtoW=R @ scene.R_BtoW)
+    return moved(scene, *rigid(_points(scene.cameras), _points(cameras)))
+
+
+def moved(scene: Scene, R: Array, p: Array) -> Scene:
+    """Return a scene in another frame: turned by R (3, 3), then moved by p (3,) [m]."""
+    cameras = tuple(placed(camera, R @ camera.R_CtoW, R @ camera.p_CinW + p) for camera in scene.cameras)
+    return replace(scene, cameras=cameras, p_BinW=scene.p_BinW @ R.T + p, R_BtoW=R @ scene.R_BtoW)
 
 
 def _points(cameras: Sequence[Camera]) -> Array:

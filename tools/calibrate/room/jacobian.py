@@ -20,8 +20,8 @@ WEAK = 1e-9  # keeps what nothing tells from making the equations singular
 class Layout:
     """Where each unknown stands in the vector of all.
 
-    First, of each camera but 0: position (3) [m], turn (3) [rad], clock offset [s]. Then, if lenses, of each camera: the
-    logarithm of its focal length and its centre (2) [px]; if marker, each ball's place in B (3) [m]; then of each
+    First, of each camera but 0: position (3) [m], turn (3) [rad], clock offset [s]. Then, if lenses, of each camera:
+    the logarithm of its focal length and its centre (2) [px]; if marker, each ball's place in B (3) [m]; then of each
     instant the marker's position (3) and turn (3).
     """
 

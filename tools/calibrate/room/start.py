@@ -72,12 +72,20 @@ def placed(camera: Camera, R_CtoW: Array, p_CinW: Array) -> Camera:
 
 def marker_way(seen: Seen, cameras: tuple[Camera, ...], offsets_s: Array, rig: Rig) -> tuple[Scene, Seen]:
     """Return the scene of given cameras, with the marker's pose at each instant that shows its triangle."""
-    points_inW = triangulated(seen, cameras, offsets_s)
-    R, p = rigid(np.broadcast_to(rig.marker.points_inB, points_inW.shape), np.nan_to_num(points_inW))
-    scene = Scene(cameras, offsets_s, np.array(rig.marker.points_inB), p, R)
-    off_m = np.linalg.norm(scene.balls_inW() - points_inW, axis=2).max(axis=1)
-    good = np.asarray(off_m < SIDES_AGREE * sides(rig.marker.points_inB).min())
-    return replace(scene, p_BinW=p[good], R_BtoW=R[good]), seen.only(good)
+    p, R = marker_poses(seen, cameras, offsets_s, rig)
+    good = np.asarray(np.isfinite(p).all(axis=1))
+    return Scene(cameras, offsets_s, np.array(rig.marker.points_inB), p[good], R[good]), seen.only(good)
+
+
+def marker_poses(seen: Seen, cameras: tuple[Camera, ...], offsets_s: Array, rig: Rig) -> tuple[Array, Array]:
+    """Return p_BinW (m, 3) and R_BtoW (m, 3, 3) at each instant; NaN where the balls make no such triangle."""
+    points_inB, points_inW = rig.marker.points_inB, triangulated(seen, cameras, offsets_s)
+    R, p = rigid(np.broadcast_to(points_inB, points_inW.shape), np.nan_to_num(points_inW))
+    balls_inW = points_inB @ np.swapaxes(R, 1, 2) + p[:, None, :]
+    off_m = np.linalg.norm(balls_inW - points_inW, axis=2).max(axis=1)
+    bad = ~(off_m < SIDES_AGREE * sides(points_inB).min())
+    p[bad] = R[bad] = np.nan
+    return p, R
 
 
 def triangulated(seen: Seen, cameras: tuple[Camera, ...], offsets_s: Array) -> Array:
@@ -124,12 +132,12 @@ def _join(seen: Seen, rig: Rig, a: int, b: int) -> _Pair:
         offsets_s = both.offsets_s.copy()
         offsets_s[b] += offset_s
         uv = both.at(offsets_s)
-        x = [_normalised(rig.cameras[c], uv[c].reshape(-1, 2)) for c in (a, b)]
+        x = [normalised(rig.cameras[c], uv[c].reshape(-1, 2)) for c in (a, b)]
         focal_px = min(rig.cameras[c].focal_px for c in (a, b))
         E, _ = cv2.findEssentialMat(x[0], x[1], np.eye(3), cv2.RANSAC, 0.999, INLIER_PX / focal_px)
         if E is not None and E.shape == (3, 3):
             essential: Array = np.asarray(E, dtype=np.float64)
-            miss = _epipolar(essential, x[0], x[1])
+            miss = epipolar(essential, x[0], x[1])
             fits.append((float(np.median(miss)), abs(offset_s), offset_s, essential, miss * focal_px < INLIER_PX, x))
     if not fits:
         raise OperatorError(_unjoined(rig, a, b))
@@ -154,12 +162,12 @@ def _unjoined(rig: Rig, a: int, b: int) -> str:
     )
 
 
-def _normalised(camera: Camera, uv_px: Array) -> Array:
+def normalised(camera: Camera, uv_px: Array) -> Array:
     rays = camera.bearings(uv_px)
     return np.asarray(rays[:, :2] / rays[:, 2:])
 
 
-def _epipolar(E: Array, x_a: Array, x_b: Array) -> Array:
+def epipolar(E: Array, x_a: Array, x_b: Array) -> Array:
     """Return how far points miss each other's epipolar lines (n,), to first order. Source: Sampson's distance."""
     a, b = (np.column_stack((x, np.ones(len(x)))) for x in (x_a, x_b))
     Ea, Eb = a @ E.T, b @ E
