@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import orjson
 
+from tools.calibrate.room.held_out import HeldOut
 from tools.calibrate.room.room import Room
 from tools.calibrate.room.verdict import Grade, Verdict, scale_off_mm, scale_tolerance_mm
 from tools.calibrate.room.volume import CELLS
@@ -87,14 +88,24 @@ def _cameras(room: Room) -> Iterator[str]:
 
 def _errors(room: Room) -> Iterator[str]:
     held_out, volume = room.held_out, room.volume
-    yield (
-        f"held out: {held_out.instants} instants, balls' distances {held_out.spacing_mm:.2f} mm off (95 %: "
-        f"{held_out.worst_spacing_mm:.2f} mm), reprojection {held_out.reprojection_px:.3f} px, epipolar "
-        f"{held_out.epipolar_px:.3f} px"
-    )
+    if not held_out.instants:
+        yield "held out: no instant that two cameras saw"
+    else:
+        yield _held_out(held_out)
+    if not volume.cells:
+        yield "volume: two cameras see none of it"
+        return
     yield (
         f"volume: two cameras see {volume.cells} of {CELLS**3} cells, the marker was in {100 * volume.visited:.0f} % "
         f"of them; a point there is known to {volume.point_mm:.1f} mm, the worst to {volume.worst_point_mm:.1f} mm"
+    )
+
+
+def _held_out(held_out: HeldOut) -> str:
+    return (
+        f"held out: {held_out.instants} instants, balls' distances {held_out.spacing_mm:.2f} mm off (95 %: "
+        f"{held_out.worst_spacing_mm:.2f} mm), reprojection {held_out.reprojection_px:.3f} px, epipolar "
+        f"{held_out.epipolar_px:.3f} px"
     )
 
 

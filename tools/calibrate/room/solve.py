@@ -26,7 +26,8 @@ from tracker.types import Array
 
 MOST_INSTANTS = 400
 ROUNDS = 2  # of adjustment: the first finds the clocks, the second takes the sightings at the right instants
-STRETCH_S, STRETCHES = 2.0, 5  # of every five stretches of two seconds the last is held out, to judge by
+STRETCH_S, LEAST_STRETCHES = 2.0, 10  # how long, and how many at least
+HELD_OUT = 5  # of every five stretches the last is held out, to judge by
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,5 +92,9 @@ def refined(tracks: Sequence[Track], t_s: Array, guess: Scene, rig: Rig, *, lens
 
 
 def is_held_out(t_s: Array) -> NDArray[np.bool_]:
-    """Say which instants (m,) are not for the fit but to judge it by."""
-    return np.asarray((t_s // STRETCH_S) % STRETCHES == STRETCHES - 1)
+    """Say which instants (m,) are not for the fit but to judge it by: whole stretches, whose errors go together."""
+    if not len(t_s):
+        return np.zeros(0, dtype=bool)
+    since_s = t_s - t_s[0]
+    stretch_s = min(STRETCH_S, max(float(since_s[-1]), 1e-9) / LEAST_STRETCHES)
+    return np.asarray((since_s // stretch_s) % HELD_OUT == HELD_OUT - 1)
