@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.compiled import compiled
 from tracker.errors import OperatorError
+from tracker.maths.compiled import compiled
 from tracker.types import Array, Estimate, frozen_array
 
 Floats = NDArray[np.float32]

@@ -34,9 +34,9 @@ from tools.request import Clocks, Pace, RunRequest
 from tools.steady import steady
 from tools.summary_file import check_summary_path, write_summary
 from tracker.errors import OperatorError
-from tracker.paper import PaperTracker
 from tracker.pipeline import Tracker
 from tracker.rig import Rig
+from tracker.start.paper import PaperTracker
 from tracker.types import Event
 
 TLOG = ".tlog"

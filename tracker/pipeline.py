@@ -13,24 +13,24 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
-from tracker.acquire import Seen, first_state
-from tracker.bias import shared_covariance
 from tracker.cadence import Cadence
-from tracker.continuity import Continuity
-from tracker.detect import Blob
-from tracker.ekf import Update
-from tracker.eyes import Eyes
+from tracker.filter.bias import shared_covariance
+from tracker.filter.continuity import Continuity
+from tracker.filter.ekf import Update
+from tracker.filter.history import History
+from tracker.filter.predict import Prediction, first_guess, predict
+from tracker.filter.sag import sag_covariance
 from tracker.harvest import Harvest
-from tracker.history import History
+from tracker.image.detect import Blob
+from tracker.image.eyes import Eyes
+from tracker.image.look import look_everywhere
+from tracker.image.tint import Gains
 from tracker.intake import Intake
-from tracker.look import look_everywhere
-from tracker.predict import Prediction, first_guess, predict
 from tracker.rig import Rig
 from tracker.rounds import Rounds
-from tracker.sag import sag_covariance
+from tracker.start.acquire import Seen, first_state
 from tracker.state import OFFSETS, REPORTED, State
 from tracker.study import Round, Study
-from tracker.tint import Gains
 from tracker.tuning import Tuning
 from tracker.types import (
     Estimate,

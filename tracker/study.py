@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from tracker.ekf import Update, update
-from tracker.eyes import Eyes
+from tracker.filter.ekf import Update, update
+from tracker.filter.predict import Prediction
+from tracker.filter.witness import doubted_alone
 from tracker.harvest import Harvest
-from tracker.look import Look
-from tracker.predict import Prediction
+from tracker.image.eyes import Eyes
+from tracker.image.look import Look
 from tracker.rig import Rig
 from tracker.state import State
 from tracker.tuning import Tuning
 from tracker.types import BallSighting, Frame, Reason, Rejected
-from tracker.witness import doubted_alone
 
 Round = tuple[Frame, ...]
 

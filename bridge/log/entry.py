@@ -12,7 +12,7 @@ from bridge.heard import NOTHING, Heard
 from bridge.log import triangle
 from bridge.log.film import Mark
 from bridge.wire import Sent
-from tracker import so3
+from tracker.maths import so3
 from tracker.types import BallSighting, Estimate, Event, Frame, Rejected, Step
 
 Value = dict[str, Any]

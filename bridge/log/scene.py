@@ -11,8 +11,8 @@ from foxglove_schemas_protobuf.Log_pb2 import Log
 from foxglove_schemas_protobuf.SceneUpdate_pb2 import SceneUpdate
 
 from bridge.log.topics import BODY, ROOM
-from tracker import so3
 from tracker.camera import Camera
+from tracker.maths import so3
 from tracker.rig import Marker
 
 _PLUMB_BOB_LENGTH = 5

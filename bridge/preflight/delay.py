@@ -11,7 +11,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize_scalar
 
-from tracker import so3
+from tracker.maths import so3
 from tracker.types import Array
 
 EARLIEST_S, LATEST_S = -0.3, 0.5  # lateness looked for; ArduPilot's VISO_DELAY_MS ends at 250 ms

@@ -9,7 +9,7 @@ import numpy as np
 
 from bridge.ned import NedFrame
 from bridge.wire import Sent
-from tracker import so3
+from tracker.maths import so3
 from tracker.types import Array, Estimate, Step, TrackState
 
 POSES = ("VISION_POSITION_ESTIMATE", "ODOMETRY", "ATT_POS_MOCAP")

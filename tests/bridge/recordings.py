@@ -13,8 +13,8 @@ import numpy as np
 from bridge.recorder import Recorder
 from bridge.wire import FieldValue, Sent
 from tests.bridge.estimates import random_covariance
-from tracker import so3
 from tracker.camera import Camera, make_camera
+from tracker.maths import so3
 from tracker.rig import Ball, Colour, Marker, make_marker
 from tracker.types import BallSighting, Estimate, Event, Frame, Reason, Rejected, Step, TrackState, frozen_array
 

@@ -18,8 +18,8 @@ from mcap_protobuf.decoder import DecoderFactory
 from bridge.log import topics, triangle
 from bridge.log.reader import LogReader
 from tests.bridge.recordings import CONFIG, LINK, START_NS, WALL_NS, cameras, record, turns
-from tracker import so3
 from tracker.errors import OperatorError
+from tracker.maths import so3
 
 COUNT = 90
 FORMAT_PAGE = Path(__file__).parents[2] / "docs" / "log-format.md"

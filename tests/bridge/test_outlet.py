@@ -21,8 +21,8 @@ from bridge.wire import Received, Sent
 from tests.bridge.estimates import beat, estimate, random_covariance, step
 from tests.bridge.mavlink_by_hand import ByHand, parse
 from tests.contracts.far_ends import FarEnd, SerialFar, SlowSerialFar, TcpFar, UdpCaller, UdpFar, eventually
-from tracker import so3
 from tracker.errors import OperatorError
+from tracker.maths import so3
 from tracker.types import Step
 
 VISION, MOCAP, SPEED, ODOMETRY = MESSAGES

@@ -18,8 +18,8 @@ from bridge.ned import NedFrame, pose_jacobian, rotation_from_room, turned_trian
 from bridge.pack import MESSAGES, Packer, heartbeat
 from tests.bridge.estimates import estimate, random_covariance
 from tests.bridge.mavlink_by_hand import ByHand, parse
-from tracker import so3
 from tracker.errors import OperatorError
+from tracker.maths import so3
 from tracker.types import Array, Estimate, frozen_array
 
 Floats = Sequence[float]

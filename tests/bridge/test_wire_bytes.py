@@ -12,7 +12,7 @@ from bridge.pack import MESSAGES, Packer, heartbeat
 from bridge.wire import Message
 from tests.bridge.estimates import estimate
 from tests.bridge.mavlink_by_hand import parse
-from tracker import so3
+from tracker.maths import so3
 from tracker.types import Estimate, frozen_array
 
 KNOWN = {

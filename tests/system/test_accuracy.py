@@ -11,10 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from bridge.settings import load_settings, rig_of
 from bridge.settings.tuning import tuning_of
-from tracker.paper import PaperTracker
 from tracker.pipeline import Tracker
 from tracker.sources.groundtruth import GroundTruth, read_ground_truth
 from tracker.sources.recording import RecordingSource
+from tracker.start.paper import PaperTracker
 from tracker.types import Array, Estimate
 
 TELEPORT = 19  # the protocol's second start, see its motions.csv

@@ -12,7 +12,7 @@ import pytest
 from bridge.settings import load_settings, rig_of
 from bridge.settings.tuning import tuning_of
 from tools.bench.trial import POSE_LIMIT, nees
-from tracker import so3
+from tracker.maths import so3
 from tracker.pipeline import Tracker
 from tracker.sources.groundtruth import GroundTruth, read_ground_truth
 from tracker.sources.recording import RecordingSource

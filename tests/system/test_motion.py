@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tools.bench.trial import Flown, Trial, fly
-from tracker import so3
+from tracker.maths import so3
 from tracker.scene import Look
 from tracker.sources.paths import PATHS, Pose, ScriptedPath
 from tracker.sources.sim import START_NS, SimTiming

@@ -27,7 +27,7 @@ from bridge.pack import MESSAGES
 from bridge.wire import Sent
 from tests.bridge.estimates import estimate, random_covariance, step
 from tests.bridge.tlogs import frames_in
-from tracker import so3
+from tracker.maths import so3
 
 HOST = "127.0.0.1"
 VEHICLE, COMPONENT = 7, 197

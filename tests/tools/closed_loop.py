@@ -14,7 +14,7 @@ from tools.simulate.autopilot.origins import Origin
 from tools.simulate.helicopter import Helicopter
 from tools.simulate.mission import Mission
 from tools.simulate.world import Surroundings, World
-from tracker import so3
+from tracker.maths import so3
 from tracker.types import Estimate, TrackState
 
 START_NS = 10**9

@@ -20,8 +20,8 @@ from tests.bridge.recordings import record, turns
 from tools.export.export import Exported, ExportTerms
 from tools.export.export import export as export_by
 from tools.export.lines import CSV_COLUMNS
-from tracker import so3
 from tracker.errors import OperatorError
+from tracker.maths import so3
 from tracker.types import Silence, frozen_array
 
 ROOT = Path(__file__).parents[2]

@@ -19,7 +19,7 @@ from tools.simulate.helicopter import (
     step,
 )
 from tools.simulate.wind import Wind
-from tracker import so3
+from tracker.maths import so3
 from tracker.types import frozen_array
 
 IN_TRIM = Helicopter(trim=(0.0, 0.0, 0.0, 0.0))

@@ -18,7 +18,7 @@ from tools.simulate.helicopter import Helicopter
 from tools.simulate.mission import Mission
 from tools.simulate.world import Surroundings, World
 from tools.sitl.wire import UdpWire
-from tracker import so3
+from tracker.maths import so3
 from tracker.types import Estimate, Step, TrackState
 
 START_NS = 10**9

@@ -9,9 +9,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from tests.tracker.paper_rig import paper_camera, paper_rig
-from tracker import so3
-from tracker.manoeuvre import start_levels
-from tracker.noise import start_noise
+from tracker.filter.manoeuvre import start_levels
+from tracker.filter.noise import start_noise
+from tracker.maths import so3
 from tracker.rig import Ball, Marker, Rig, make_marker, make_rig
 from tracker.state import ATTITUDE, POSITION, RATE, VELOCITY, Process, State
 from tracker.tuning import Tuning

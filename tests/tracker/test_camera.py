@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.tracker.paper_rig import FOCAL_PX, paper_camera
-from tracker import so3
 from tracker.camera import Camera, make_camera
 from tracker.errors import OperatorError
+from tracker.maths import so3
 from tracker.types import Array
 
 DISTORTIONS = [

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.tracker.paper_rig import paper_rig
-from tracker import so3
+from tracker.maths import so3
 from tracker.rig import Rig
 from tracker.scene import Look, Occluder, Pose, SceneRenderer, Sphere, Trouble, hand
 from tracker.scene.ball import BallPainter, RayMap

@@ -11,8 +11,8 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 from tests.tracker.rigs import PROCESS, SECOND_NS, difference, perturbed, state
-from tracker.predict import predict
-from tracker.singer import carried, process_noise
+from tracker.filter.predict import predict
+from tracker.filter.singer import carried, process_noise
 from tracker.state import State
 from tracker.types import Array
 

@@ -13,8 +13,8 @@ from bridge.settings import Settings, rig_of
 from tools.bench.limits import Key, centre_bounds, pose_bounds, truth_about
 from tools.request import Clocks
 from tools.session import tracker_of
-from tracker import so3
 from tracker.errors import OperatorError
+from tracker.maths import so3
 from tracker.rig import Rig
 from tracker.sources.groundtruth import GroundTruth, read_ground_truth
 from tracker.sources.recording import RecordingSource

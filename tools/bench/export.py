@@ -18,7 +18,7 @@ from bridge.wire import Sent
 from tools.bench.memory import status_mb
 from tools.export.export import ExportTerms, export
 from tools.request import CpuClocks
-from tracker import so3
+from tracker.maths import so3
 from tracker.types import BallSighting, Estimate, Frame, Step, TrackState, frozen_array
 
 FRAME_NS = 66_666_667

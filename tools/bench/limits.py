@@ -11,7 +11,7 @@ import numpy as np
 from tools.bench.bound import parameter_bound, pose_bound
 from tools.bench.noise import TO_YCC, Noise, measure_noise
 from tools.bench.profile import TERMS, Disc, columns, draw
-from tracker.measure import predicted_pixels
+from tracker.filter.measure import predicted_pixels
 from tracker.rig import Rig
 from tracker.sources.groundtruth import GroundTruth
 from tracker.state import ATTITUDE, POSITION, State

@@ -13,7 +13,7 @@ from scipy.stats import chi2, norm
 from bridge.settings import load_settings, rig_of
 from tools.request import Clocks
 from tools.session import tracker_of
-from tracker import so3
+from tracker.maths import so3
 from tracker.rig import Rig
 from tracker.scene import Look
 from tracker.sources.paths import ScriptedPath, scripted_path

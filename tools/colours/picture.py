@@ -10,7 +10,7 @@ import numpy as np
 
 from tools.colours.verdict import clash_line, shown_clashes
 from tracker.errors import OperatorError
-from tracker.look import look_everywhere
+from tracker.image.look import look_everywhere
 from tracker.palette.background import Clash
 from tracker.palette.learn import Palette, Seen
 from tracker.palette.mask import colour_mask

@@ -9,8 +9,8 @@ import numpy as np
 
 from tools.bench.trial import Trial, fly
 from tools.place.limits import Limits
-from tracker import so3
 from tracker.camera import Camera
+from tracker.maths import so3
 from tracker.placement.forecast import forecast
 from tracker.placement.views import Poses, look
 from tracker.rig import make_rig

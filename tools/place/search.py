@@ -17,8 +17,8 @@ import numpy as np
 from scipy.optimize import minimize
 
 from tools.place.limits import Limits
-from tracker import so3
 from tracker.errors import OperatorError
+from tracker.maths import so3
 from tracker.placement.forecast import CAMERAS_NEEDED, ball_error, covariance_of, lever
 from tracker.placement.mount import Stand, aimed
 from tracker.placement.views import View, look, poses_of

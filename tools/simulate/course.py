@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 
 from tools.simulate.helicopter import State
-from tracker import so3
+from tracker.maths import so3
 from tracker.sources.paths import Pose
 
 _MEMORY_NS = 2_000_000_000

@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
-from tracker.compiled import compiled
-from tracker.so3_compiled import turn_into
+from tracker.maths.compiled import compiled
+from tracker.maths.so3_compiled import turn_into
 from tracker.types import Array
 
 P, V, THETA, W, CYCLIC, LIFT = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12), slice(12, 14), 14

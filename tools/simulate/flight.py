@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tools.simulate.world import Moment
-from tracker import so3
+from tracker.maths import so3
 from tracker.sources.paths import Pose
 from tracker.types import Array, Estimate
 

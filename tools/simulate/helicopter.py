@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 
 from tools.simulate.dynamics import CYCLIC, GRAVITY, LIFT, STATE_SIZE, THETA, P, V, W, moved, told_by
-from tracker import so3
+from tracker.maths import so3
 from tracker.types import Array, frozen_array
 
 

@@ -15,8 +15,8 @@ import numpy as np
 from tools.simulate.autopilot.imu import FLIP
 from tools.simulate.dynamics import GRAVITY
 from tools.simulate.helicopter import State
-from tracker import so3
 from tracker.errors import OperatorError
+from tracker.maths import so3
 from tracker.types import Array
 
 _PACKET = struct.Struct("<HHI16H")

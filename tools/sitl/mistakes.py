@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from bridge.wire import FieldValue, Message
-from tracker import so3
+from tracker.maths import so3
 from tracker.types import Estimate, frozen_array
 
 SENT = ("VISION_POSITION_ESTIMATE", "VISION_SPEED_ESTIMATE")

@@ -14,7 +14,7 @@ from tools.simulate.mission import Mission, Phase
 from tools.simulate.verdict import Line, Verdict, distance_to_path
 from tools.sitl.faults import Outcome
 from tools.sitl.world import Sample
-from tracker import so3
+from tracker.maths import so3
 from tracker.sources.paths import Pose
 from tracker.types import Array, Estimate
 

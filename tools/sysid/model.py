@@ -12,8 +12,8 @@ import math
 import numpy as np
 
 from tools.simulate.dynamics import GRAVITY
-from tracker.compiled import compiled
-from tracker.so3_compiled import turn_into
+from tracker.maths.compiled import compiled
+from tracker.maths.so3_compiled import turn_into
 from tracker.types import Array
 
 STATES = 12

@@ -9,7 +9,7 @@ import numpy as np
 from tools.sysid import parameters
 from tools.sysid.flight_data import FlightData, Sticks, Track, in_heading, turns
 from tools.sysid.model import STATES, simulate
-from tracker import so3
+from tracker.maths import so3
 from tracker.types import Array
 
 CHANNELS = ("forward", "left", "up", "roll", "pitch", "yaw")

@@ -11,13 +11,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.detect import Region
+from tracker.image.detect import Region
+from tracker.image.sight import LEAST_AREA_SHARE, MOST_AREA_SHARE
+from tracker.image.spots import ASPECT_MAX, FILL_MIN, MIN_AREA_PX
 from tracker.palette.box import Paint
 from tracker.palette.chroma import chroma, hsv_of, hue_from
 from tracker.palette.mask import colour_mask
 from tracker.rig import Colour
-from tracker.sight import LEAST_AREA_SHARE, MOST_AREA_SHARE
-from tracker.spots import ASPECT_MAX, FILL_MIN, MIN_AREA_PX
 from tracker.types import Array, Image
 
 BEHIND_MAX = 0.3  # share of pictures in which a pixel may show the vehicle and its median still be room

@@ -13,15 +13,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tracker.acquire import first_state
 from tracker.errors import OperatorError
-from tracker.look import look_everywhere
+from tracker.image.look import look_everywhere
 from tracker.palette.background import Background, Clash, find_clashes, learn_background
 from tracker.palette.box import Paint, gap_deg, learn_boxes, paint_seen
 from tracker.palette.identify import Identified, ball_radius_m, expected_radius_px, identify
 from tracker.palette.samples import BallPixels, ball_pixels, vehicle_mask
 from tracker.palette.spots import find_spots
 from tracker.rig import Colour, Rig, make_marker, make_rig
+from tracker.start.acquire import first_state
 from tracker.tuning import Tuning
 from tracker.types import Array, Frame, Image, Rejected
 

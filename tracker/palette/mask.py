@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from tracker.colour_table import HUE_STEPS
+from tracker.image.colour_table import HUE_STEPS
 from tracker.rig import Colour
 from tracker.types import Image
 

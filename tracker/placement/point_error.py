@@ -7,8 +7,8 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from tracker import so3
-from tracker.pose3 import attitude
+from tracker.maths import so3
+from tracker.start.pose3 import attitude
 from tracker.types import Array, Rejected
 
 PAPER_ERROR_M, PAPER_SIDE_M = 0.008, 0.160

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker import so3
 from tracker.camera import Camera
+from tracker.maths import so3
 from tracker.rig import Marker
 from tracker.types import Array
 

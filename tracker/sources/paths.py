@@ -10,8 +10,8 @@ from typing import Protocol
 
 import numpy as np
 
-from tracker import so3
 from tracker.errors import OperatorError
+from tracker.maths import so3
 from tracker.sources.random_flight import random_flight
 from tracker.types import Array
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from tracker import so3
+from tracker.maths import so3
 from tracker.types import Array
 
 WAVES = 3  # of each motion

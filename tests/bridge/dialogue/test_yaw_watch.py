@@ -7,7 +7,7 @@ import pytest
 
 from bridge.dialogue.yaw_watch import ALARM_DEG, YawReading, YawWatch, tilt_acceleration
 from tests.bridge.dialogue.flights import Sample, fly
-from tracker import so3
+from tracker.maths import so3
 
 
 def watched(samples: list[Sample]) -> YawReading:

@@ -7,7 +7,7 @@ import pytest
 
 from bridge.preflight.delay import Delay, TooLittle, find_delay
 from tests.bridge.preflight.wiggles import Wiggle, wiggle
-from tracker import so3
+from tracker.maths import so3
 
 
 def found(made: Wiggle) -> Delay | TooLittle:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation, RotationSpline
 
-from tracker import so3
+from tracker.maths import so3
 from tracker.types import Array
 
 START_NS = 5_000_000_000

@@ -12,7 +12,7 @@ from tools.simulate.autopilot.failsafe import EkfFailsafe
 from tools.simulate.autopilot.imu import Increment
 from tools.simulate.autopilot.navigation import Variances
 from tools.simulate.dynamics import GRAVITY
-from tracker import so3
+from tracker.maths import so3
 from tracker.types import Array
 
 DT_S = 0.02

@@ -17,7 +17,7 @@ from tools.calibrate.formats.convert import FileFormat, read_cameras, write_came
 from tools.calibrate.formats.poses import pose_of
 from tracker.camera import Camera, make_camera
 from tracker.errors import OperatorError
-from tracker.so3 import exp
+from tracker.maths.so3 import exp
 
 SUFFIX = {"toml": ".toml", "kalibr": ".yaml", "ros": ".yaml", "euroc": ".yaml", "opencv": ".yml"}
 TURN = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from tracker import so3
+from tracker.maths import so3
 from tracker.sources.paths import Pose
 from tracker.types import Array
 

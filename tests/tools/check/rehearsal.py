@@ -26,7 +26,7 @@ from tools.simulate.autopilot.vessel import Autopilot
 from tools.simulate.course import Course
 from tools.simulate.helicopter import State
 from tools.sitl.wire import UdpWire
-from tracker import so3
+from tracker.maths import so3
 from tracker.types import Array, Estimate, Event, Silence, Step, TrackState
 
 START_NS = 50_000_000_000

@@ -17,8 +17,8 @@ from tests.tools.export.flights import MS, START_NS, Line, S, every, write
 from tools.compare.command import run_compare
 from tools.compare.figures import compare, nis_share
 from tools.compare.flown import Path7, read_flown
-from tracker import so3
 from tracker.errors import OperatorError
+from tracker.maths import so3
 from tracker.types import Array, frozen_array
 
 PERIOD_NS = 66_666_667

@@ -12,7 +12,7 @@ from bridge.log import topics
 from bridge.log.container import Container
 from bridge.log.entry import encode, estimate_value
 from tests.bridge.estimates import estimate
-from tracker import so3
+from tracker.maths import so3
 from tracker.types import Array, frozen_array
 
 S, MS = 1_000_000_000, 1_000_000

@@ -19,8 +19,8 @@ from tools.sitl.process import Wiring, arguments
 from tools.sitl.relay import Relay
 from tools.sitl.setup import parameter_file
 from tools.sitl.wire import TcpWire, UdpWire
-from tracker import so3
 from tracker.errors import OperatorError
+from tracker.maths import so3
 
 NO_RADIO = (1500,) * 8
 

@@ -12,7 +12,7 @@ from tools.simulate.helicopter import Helicopter, State, Sticks, step
 from tools.simulate.wind import Wind
 from tools.sysid.flight_data import FlightData, Track, make_sticks
 from tools.sysid.parameters import AXES, Axis, vector
-from tracker import so3
+from tracker.maths import so3
 from tracker.types import Array
 
 STEP_S, TICK_STEPS = 0.0025, 8

@@ -16,7 +16,7 @@ from tools.sysid.flight_data import FlightData, Track, make_sticks
 from tools.sysid.frequency import transfer
 from tools.sysid.parameters import AXES, INDEX, Axis
 from tools.sysid.response import Unknowns, all_residuals, first_states, respond
-from tracker import so3
+from tracker.maths import so3
 from tracker.types import Array
 
 _RATE_HZ = 50.0

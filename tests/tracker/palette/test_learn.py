@@ -10,12 +10,12 @@ import pytest
 from tests.tracker.palette.rooms import RIG, SIDE_LIGHT, Casts, Thing, cast, flown, places, tracked
 from tests.tracker.rigs import TUNING
 from tools.colours.verdict import judge
-from tracker.acquire import first_state
 from tracker.errors import OperatorError
-from tracker.look import look_everywhere
+from tracker.image.look import look_everywhere
 from tracker.palette.background import ClashKind
 from tracker.palette.learn import Palette, learn
 from tracker.scene import Look
+from tracker.start.acquire import first_state
 from tracker.types import Frame, Rejected
 
 YELLOW, GREEN, ORANGE = range(3)

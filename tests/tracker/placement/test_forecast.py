@@ -9,8 +9,8 @@ import pytest
 from scipy.optimize import least_squares
 
 from tests.tracker.rigs import ring_rig
-from tracker import so3
 from tracker.camera import Camera
+from tracker.maths import so3
 from tracker.placement.forecast import ball_error, forecast, lever
 from tracker.placement.mount import Box, Lens, aimed
 from tracker.placement.views import Poses, Sharpness, attitudes_within, look, poses_of

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tracker import so3
 from tracker.errors import OperatorError
+from tracker.maths import so3
 from tracker.sources.groundtruth import read_ground_truth
 
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from tests.tracker.paper_rig import paper_rig
-from tracker import so3
 from tracker.errors import OperatorError
+from tracker.maths import so3
 from tracker.rig import Rig
 from tracker.sources.paths import PATHS, PathFunction, Pose, motion, scripted_path
 from tracker.sources.sim import START_NS, SimSource, SimTiming

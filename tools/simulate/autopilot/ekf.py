@@ -13,7 +13,7 @@ import numpy as np
 
 from tools.simulate.autopilot.imu import Increment
 from tools.simulate.dynamics import GRAVITY
-from tracker import so3
+from tracker.maths import so3
 from tracker.types import Array
 
 _P, _V, _R, _BG, _BA = (slice(k, k + 3) for k in (0, 3, 6, 9, 12))

@@ -9,7 +9,7 @@ import numpy as np
 
 from tools.simulate.dynamics import GRAVITY
 from tools.simulate.helicopter import State
-from tracker import so3
+from tracker.maths import so3
 from tracker.types import Array
 
 FLIP = np.array([1.0, -1.0, -1.0])

@@ -18,7 +18,7 @@ from tools.simulate.autopilot.imu import Increment
 from tools.simulate.autopilot.origins import INITIALISED_MS, Origin, Origins
 from tools.simulate.autopilot.parameters import Parameters
 from tools.simulate.autopilot.vision import PoseSample, SpeedSample
-from tracker import so3
+from tracker.maths import so3
 from tracker.types import Array
 
 ALIGNED_MS = 5400

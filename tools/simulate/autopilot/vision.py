@@ -14,7 +14,7 @@ import numpy as np
 from bridge.wire import FieldValue, Received
 from tools.simulate.autopilot.jitter import JitterCorrection
 from tools.simulate.autopilot.parameters import Parameters
-from tracker import so3
+from tracker.maths import so3
 from tracker.types import Array
 
 SILENCE_MS = 300

@@ -1,0 +1,50 @@
+"""A ball seen by one camera alone is believed less while a turn is open."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tests.tracker.rigs import TUNING
+from tracker.filter.witness import DOUBT_PX, OPEN_RAD, doubted_alone
+from tracker.state import ATTITUDE, State, start_covariance
+from tracker.types import BallSighting, frozen_array
+
+SIGMA_PX = 0.05
+
+
+def state(attitude_rad: float) -> State:
+    P = start_covariance(TUNING.process, np.zeros(1), 1e-3, attitude_rad)
+    return State(0, np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3), P)
+
+
+def seen(*pairs: tuple[int, int]) -> list[BallSighting]:
+    cov_px = frozen_array(SIGMA_PX**2 * np.eye(2))
+    return [BallSighting(camera, ball, 0, frozen_array((320.0, 240.0)), cov_px) for camera, ball in pairs]
+
+
+WITH_ONE_ALONE = seen((0, 0), (1, 0), (0, 1), (1, 1), (1, 2))
+
+
+def test_while_a_turn_is_open_what_one_camera_sees_alone_is_doubted_and_nothing_else() -> None:
+    *borne_out, alone = doubted_alone(WITH_ONE_ALONE, state(10.0 * OPEN_RAD))
+    assert borne_out == WITH_ONE_ALONE[:4]
+    assert alone.cov_px.diagonal() == pytest.approx(DOUBT_PX**2 + SIGMA_PX**2)
+
+
+def test_while_the_attitude_is_well_known_nothing_is_doubted() -> None:
+    assert doubted_alone(WITH_ONE_ALONE, state(0.3 * OPEN_RAD)) == tuple(WITH_ONE_ALONE)
+
+
+def test_a_camera_that_sees_alone_needs_no_other() -> None:
+    sightings = seen((1, 0), (1, 1), (1, 2))
+    assert doubted_alone(sightings, state(10.0 * OPEN_RAD)) == tuple(sightings)
+
+
+def test_one_open_axis_is_enough() -> None:
+    known = state(0.3 * OPEN_RAD)
+    P = known.P.copy()
+    P[ATTITUDE.start + 2, ATTITUDE.start + 2] = (10.0 * OPEN_RAD) ** 2
+    assert doubted_alone(WITH_ONE_ALONE, replace(known, P=P))[-1].cov_px[0, 0] > 1.0

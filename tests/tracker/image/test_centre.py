@@ -1,0 +1,124 @@
+"""The centre of one ball to a fraction of a pixel, on balls drawn by other means."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from tests.tracker.drawing import developed, draw_ball, empty_canvas
+from tests.tracker.paper_rig import paper_rig
+from tracker.image.appearance import Appearance
+from tracker.image.centre import Centre, fit_centre
+from tracker.image.patch import Expected, Response
+from tracker.image.template import FLAT
+from tracker.types import Array, Image, Reason
+
+RIG = paper_rig()
+CAMERA = RIG.cameras[0]
+BALL = RIG.marker.balls[1]
+RADIUS_PX = 2.8  # the paper's ball in the middle of the room
+SHARP = Response(0.2, 0.2, detail=1.0)
+
+
+def expected(uv_px: Array, radius_px: float = RADIUS_PX) -> Expected:
+    return Expected((float(uv_px[0]), float(uv_px[1])), radius_px, (0.0, 0.0), FLAT, SHARP)
+
+
+def picture(
+    uv_px: Array, radius_px: float = RADIUS_PX, noise: tuple[float, np.random.Generator] | None = None
+) -> Image:
+    canvas = empty_canvas(RIG.cameras[0])
+    draw_ball(canvas, uv_px, radius_px, BALL)
+    return developed(canvas, noise)
+
+
+def fitted(image: Image, guess_px: Array, radius_px: float = RADIUS_PX) -> Centre:
+    found = fit_centre(image, expected(guess_px, radius_px))
+    assert isinstance(found, Centre), found
+    return found
+
+
+def accustomed(radius_px: float) -> Appearance:
+    """Return what a camera has learned from forty balls."""
+    rng = np.random.default_rng(2)
+    known = Appearance(SHARP)
+    for _ in range(40):
+        uv_px = rng.uniform((200, 200), (400, 300))
+        image = picture(uv_px, radius_px, noise=(1.0, rng))
+        what = known.expected_like(expected(uv_px, radius_px), CAMERA, uv_px)
+        found = fit_centre(image, what)
+        assert isinstance(found, Centre)
+        known = known.learned(image, CAMERA, what, found)
+    return known
+
+
+@pytest.mark.parametrize("radius_px", [2.2, 2.8, 4.0, 6.5])
+def test_a_ball_is_found_to_a_thirtieth_of_a_pixel_once_the_light_is_known(radius_px: float) -> None:
+    """Root mean square on each axis, at noise of one grey level, however rough the start."""
+    rng, known = np.random.default_rng(3), accustomed(radius_px)
+    errors = []
+    for _ in range(12):
+        uv_px = rng.uniform((200, 200), (400, 300))
+        start_px = uv_px + rng.uniform(-0.7, 0.7, 2)
+        what = known.expected_like(expected(uv_px, radius_px), CAMERA, start_px)
+        found = fit_centre(picture(uv_px, radius_px, noise=(1.0, rng)), what)
+        assert isinstance(found, Centre)
+        errors.append(found.uv_px - uv_px)
+    assert np.sqrt(np.mean(np.square(errors), axis=0)).max() < 1.0 / 30.0
+
+
+@pytest.mark.parametrize("radius_px", [2.2, 2.8, 4.0, 6.5])
+def test_a_ball_in_light_not_known_is_found_to_a_twentieth_of_its_radius(radius_px: float) -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(6):
+        uv_px = rng.uniform((200, 200), (400, 300))
+        found = fitted(picture(uv_px, radius_px), uv_px + rng.uniform(-0.7, 0.7, 2), radius_px)
+        assert np.hypot(*(found.uv_px - uv_px)) < 0.05 * radius_px
+
+
+def test_the_mean_error_over_many_places_is_small_though_the_light_is_not_known() -> None:
+    rng = np.random.default_rng(4)
+    errors = []
+    for _ in range(30):
+        uv_px = rng.uniform((200, 200), (400, 300))
+        errors.append(fitted(picture(uv_px, noise=(2.0, rng)), uv_px + rng.uniform(-0.5, 0.5, 2)).uv_px - uv_px)
+    assert np.abs(np.mean(errors, axis=0)).max() < 0.06
+    assert np.std(errors, axis=0).max() < 0.04
+
+
+def test_the_covariance_is_one_and_grows_with_the_noise() -> None:
+    rng = np.random.default_rng(5)
+    uv_px = np.array([300.4, 200.2])
+    sigmas = []
+    for level in (0.5, 4.0, 12.0):
+        found = fitted(picture(uv_px, noise=(level, rng)), uv_px)
+        assert np.allclose(found.cov_px, found.cov_px.T)
+        assert np.linalg.eigvalsh(found.cov_px).min() > 0.0
+        sigmas.append(float(np.sqrt(np.trace(found.cov_px))))
+    assert sigmas == sorted(sigmas)
+    assert sigmas[-1] > 2.0 * sigmas[0]
+
+
+def test_errors_are_of_the_size_that_the_covariance_says() -> None:
+    """Mean NEES of a 2-D error is 2; within a factor of three, as the drawn ball is not quite the modelled one."""
+    rng = np.random.default_rng(6)
+    nees = []
+    for _ in range(40):
+        uv_px = rng.uniform((200, 200), (400, 300))
+        found = fitted(picture(uv_px, noise=(5.0, rng)), uv_px)
+        error = found.uv_px - uv_px
+        nees.append(error @ np.linalg.solve(found.cov_px, error))
+    assert 2.0 / 3.0 < np.mean(nees) < 6.0
+
+
+@pytest.mark.parametrize("uv_px", [(1.0, 200.0), (200.0, 2.0), (638.5, 200.0), (200.0, 478.0), (-5.0, -5.0)])
+def test_a_ball_cut_by_the_border_is_rejected(uv_px: tuple[float, float]) -> None:
+    assert fit_centre(picture(np.array(uv_px)), expected(np.array(uv_px))) is Reason.AT_BORDER
+
+
+def test_an_image_that_nobody_may_write_to_can_be_fitted() -> None:
+    uv_px = np.array([300.4, 200.2])
+    image = picture(uv_px)
+    writeable = fitted(image, uv_px)
+    image.flags.writeable = False
+    assert np.array_equal(fitted(image, uv_px).uv_px, writeable.uv_px)

@@ -1,0 +1,1 @@
+"""From sightings to the vehicle's state: the estimator and its parts."""

@@ -1,0 +1,142 @@
+"""The sightings of one round as arrays, and what a prediction says of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracker.filter.correction import innovation_covariance, path_noise
+from tracker.filter.manoeuvre import variances
+from tracker.filter.measure import Indices, camera_table, marker_points, pixels
+from tracker.filter.predict import Prediction
+from tracker.filter.sag import sag_noise
+from tracker.filter.singer import process_noise
+from tracker.maths.compiled import compiled
+from tracker.rig import Rig
+from tracker.state import OFFSETS
+from tracker.types import Array, BallSighting
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Batch:
+    """Sightings as arrays, and what the prediction says of them.
+
+    z (2n,), R (2n, 2n): pixels and the noise of fit and camera.  cameras, balls, lags_s (n,) [s].
+    y (2n,): the prediction's innovation.  A (2n, 2n): its covariance without any manoeuvre.
+    B (2, 2n, 2n): what accelerations of variance 1 add to it, of translation and of rotation.
+    path (2, 2n, 2n): the part of B that lies between the state's time and the cameras'.
+    doubt (2n, 2n): unknown speed times unknown clock offset, part of A.
+    tops (2,): the envelope's variances.
+    """
+
+    sightings: tuple[BallSighting, ...]
+    z: Array
+    R: Array
+    cameras: Indices
+    balls: Indices
+    lags_s: Array
+    y: Array
+    A: Array
+    B: Array
+    path: Array
+    doubt: Array
+    tops: Array
+
+    def part(self, kept: list[int]) -> Batch:
+        """Return the batch with only the sightings of these indices."""
+        if len(kept) == len(self.sightings):
+            return self
+        i = np.array(kept)
+        rows = np.stack((2 * i, 2 * i + 1), axis=1).reshape(-1)
+        square = (..., rows[:, None], rows)
+        return Batch(
+            tuple(self.sightings[k] for k in kept), self.z[rows], self.R[square], self.cameras[i], self.balls[i],
+            self.lags_s[i], self.y[rows], self.A[square],
+            np.ascontiguousarray(self.B[square]), np.ascontiguousarray(self.path[square]), self.doubt[square],
+            self.tops,
+        )  # fmt: skip
+
+    def distances2(self) -> list[float]:
+        """Return each sighting's squared Mahalanobis distance (n,), as far as the envelope goes; inf where unseen."""
+        found: list[float] = _distances2(self.y, self.A, self.B, self.tops).tolist()
+        return found
+
+
+def make_batch(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig) -> Batch:
+    """Compare sightings with a prediction. A ball predicted behind its camera has NaN for an innovation."""
+    state, T = ahead.state, ahead.process.manoeuvre_s
+    cameras = np.array([s.camera for s in sightings])
+    balls = np.array([s.ball for s in sightings])
+    lags_s = np.array([s.t_ns - state.t_ns for s in sightings]) * 1e-9
+    z = np.concatenate([s.uv_px for s in sightings])
+    covs_px = np.concatenate([s.cov_px for s in sightings])
+    points_inB = marker_points(rig) - ahead.pivot_inB
+    h, H = pixels(state.mean, T, cameras, balls, lags_s, camera_table(rig), points_inB)
+    true_lags_s = lags_s + state.offsets_s[cameras]
+    R, A, B, path, doubt = _covariances(H, ahead.P_coasted, ahead.dt, T, covs_px, state.noise, cameras, true_lags_s)
+    if ahead.pivot_inB.any():
+        A += sag_noise(H, balls, points_inB, state.mean, state.P)
+    return Batch(sightings, z, R, cameras, balls, lags_s, z - h, A, B, path, doubt, variances(ahead.process)[:, -1])
+
+
+@compiled("f8[::1](f8[::1], f8[:, ::1], f8[:, :, ::1], f8[:])")
+def _distances2(y: Array, A: Array, B: Array, tops: Array) -> Array:
+    """Return y' S^-1 y (n,) of each sighting's 2 x 2 block."""
+    found = np.empty(len(y) // 2)
+    for s in range(len(found)):
+        i = 2 * s
+        a = A[i, i] + tops[0] * B[0, i, i] + tops[1] * B[1, i, i]
+        b = A[i, i + 1] + tops[0] * B[0, i, i + 1] + tops[1] * B[1, i, i + 1]
+        d = A[i + 1, i + 1] + tops[0] * B[0, i + 1, i + 1] + tops[1] * B[1, i + 1, i + 1]
+        u, v = y[i], y[i + 1]
+        found[s] = (d * u * u - 2.0 * b * u * v + a * v * v) / (a * d - b * b)
+    return found
+
+
+@compiled("f8[:, ::1](f8[:, ::1], f8[:, ::1], i8[::1])")
+def _doubt(P: Array, H: Array, cameras: Indices) -> Array:
+    """Return the covariance (2n, 2n) [px^2] of unknown speed times unknown clock offset.
+
+    Source: a pixel goes by J (v + dv) (o + do). dv do is of second order, and no slope at v = 0, o = 0 shows it; its
+        covariance is J P_vv J' P_oo, the two being independent at first; the same for the body's turn.
+    """
+    doubt = np.zeros((len(H), len(H)))
+    for i in range(len(H)):
+        camera = cameras[i // 2]
+        variance = P[OFFSETS + camera - 1, OFFSETS + camera - 1] if camera > 0 else 0.0
+        if variance == 0.0:
+            continue
+        for j in range(len(H)):
+            if cameras[j // 2] == camera:
+                for k in range(3):
+                    for m in range(3):
+                        speed = H[i, k] * P[6 + k, 6 + m] * H[j, m]
+                        doubt[i, j] += variance * (speed + H[i, 3 + k] * P[9 + k, 9 + m] * H[j, 3 + m])
+    return doubt
+
+
+@compiled("Tuple((f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1]))"
+          "(f8[:, ::1], f8[:, ::1], f8, f8, f8[:, ::1], f8[:, ::1], i8[::1], f8[::1])")  # fmt: skip
+def _covariances(
+    H: Array, P: Array, dt: float, T: float, covs_px: Array, noise: Array, cameras: Indices, lags_s: Array
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Return R, A, B, path and doubt of a `Batch`.
+
+    Args:
+        H (2n, size), P: slope of the sightings and coasted covariance.  covs_px: (2n, 2) the fits' own, one below the
+        other.  noise: `State.noise`.  lags_s: (n,) of each sighting's true time after the state's.
+    """
+    rows, size = H.shape
+    R = np.zeros((rows, rows))
+    for i in range(rows):
+        first = i - i % 2
+        R[i, first], R[i, first + 1] = covs_px[i, 0], covs_px[i, 1]
+        R[i, i] += noise[cameras[i // 2], 0]
+    path, B = np.empty((2, rows, rows)), np.empty((2, rows, rows))
+    for k in range(2):
+        path[k] = path_noise(H, cameras, lags_s, T, 3 * k)
+        unit = process_noise(size, dt, T, 1.0 - k, float(k))
+        B[k] = innovation_covariance(H, unit, path[k])
+    doubt = _doubt(P, H, cameras)
+    return R, innovation_covariance(H, P, R + doubt), B, path, doubt

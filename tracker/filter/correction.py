@@ -1,0 +1,272 @@
+"""The inner loops of the filter's update, compiled: iterate to the likeliest state, weigh innovations."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from tracker.filter.measure import Indices, pixels
+from tracker.filter.singer import unit_noise
+from tracker.maths.compiled import compiled
+from tracker.maths.so3_compiled import turn_into
+from tracker.maths.solve import dot
+from tracker.types import Array
+
+MAX_ITERATIONS = 8
+CONVERGED_SIGMA = 0.02  # stop when the last step is this small against the posterior's own sigma
+TILT_ROWS = 2
+
+
+@compiled("f8[:, ::1](f8[:, ::1])")
+def factor(S: Array) -> Array:
+    """Return L (n, n), lower, with L L' = S; NaN where S is not positive definite."""
+    n = len(S)
+    L = np.zeros((n, n))
+    for i in range(n):
+        for j in range(i + 1):
+            rest = S[i, j]
+            for k in range(j):
+                rest -= L[i, k] * L[j, k]
+            L[i, j] = math.sqrt(rest) if i == j else rest / L[j, j]
+    return L
+
+
+@compiled("f8[:, ::1](f8[:, ::1], f8[:, ::1])")
+def forward(L: Array, B: Array) -> Array:
+    """Return L^-1 B (n, m)."""
+    X = B.copy()
+    for i in range(len(L)):
+        for k in range(i):
+            share = L[i, k]
+            for j in range(B.shape[1]):
+                X[i, j] -= share * X[k, j]
+        for j in range(B.shape[1]):
+            X[i, j] /= L[i, i]
+    return X
+
+
+@compiled("f8[:, ::1](f8[:, ::1], f8[:, ::1], f8[:, ::1])")
+def innovation_covariance(H: Array, P: Array, R: Array) -> Array:
+    """Return H P H' + R."""
+    m, n = H.shape
+    S, HP = R.copy(), np.zeros((m, n))
+    for i in range(m):
+        for k in range(n):
+            if H[i, k] != 0.0:
+                for j in range(n):
+                    HP[i, j] += H[i, k] * P[k, j]
+        for j in range(i + 1):
+            for k in range(n):
+                S[i, j] += HP[i, k] * H[j, k]
+            S[j, i] = S[i, j]
+    return S
+
+
+@compiled("f8[:, ::1](f8[:, ::1])")
+def inverse_of(S: Array) -> Array:
+    """Return the inverse of a covariance (n, n)."""
+    root = forward(factor(S), np.eye(len(S)))
+    inverse = np.zeros(S.shape)
+    for k in range(len(S)):
+        for i in range(k + 1):
+            for j in range(k + 1):
+                inverse[i, j] += root[k, i] * root[k, j]
+    return inverse
+
+
+@compiled("Tuple((f8[::1], f8[:, ::1], f8))(f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
+def weighed(y: Array, H: Array, P: Array, R: Array) -> tuple[Array, Array, float]:
+    """Return S^-1 y, S^-1 and y' S^-1 y of the sightings, the two last rows (the tilt) left out."""
+    n = len(y) - TILT_ROWS
+    inverse = inverse_of(innovation_covariance(H[:n], P, R[:n, :n].copy()))
+    u, nis = np.zeros(n), 0.0
+    for i in range(n):
+        for j in range(n):
+            u[i] += inverse[i, j] * y[j]
+        nis += u[i] * y[i]
+    return u, inverse, nis
+
+
+@compiled("f8[:, ::1](f8[:, ::1], i8[::1], f8[::1], f8, i8)")
+def path_noise(H: Array, cameras: Indices, lags_s: Array, T: float, first: int) -> Array:
+    """Return the covariance (2n, 2n) [px^2] of what an unknown path adds between the state's time and the cameras'.
+
+    Args:
+        lags_s: (n,) of each sighting's true time after the state's.
+        first: error from which three are moved by an acceleration of variance 1: 0 for place, 3 for attitude.
+    """
+    n = len(cameras)
+    R = np.zeros((2 * n, 2 * n))
+    for s in range(n):
+        noise = unit_noise(abs(lags_s[s]), T)[0]
+        for r in range(n):
+            if cameras[r] == cameras[s] and noise > 0.0:
+                for k in range(2):
+                    for m in range(2):
+                        for i in range(first, first + 3):
+                            R[2 * s + k, 2 * r + m] += noise * H[2 * s + k, i] * H[2 * r + m, i]
+    return R
+
+
+@compiled("f8[:, ::1](f8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], UniTuple(f8, 2))")
+def log_likelihoods(y: Array, A: Array, B: Array, variances: Array, means: tuple[float, float]) -> Array:
+    """Return the log likelihoods (2, levels) of innovations y (n,) under S = A + s B[0] + r B[1], up to a constant.
+
+    Args:
+        B: (2, n, n) by a variance of 1 of translation and of rotation.
+        variances: (2, levels) tried of one, while the other has its mean.  means: (2,).
+    """
+    n = len(y)
+    found, L, white = np.empty(variances.shape), np.empty((n, n)), np.empty(n)
+    for k in range(2):
+        for level in range(variances.shape[1]):
+            total, s, r = 0.0, variances[k, level], means[1 - k]
+            for i in range(n):
+                for j in range(i + 1):
+                    L[i, j] = A[i, j] + s * B[k, i, j] + r * B[1 - k, i, j]
+                white[i] = y[i]
+            for i in range(n):
+                for j in range(i):
+                    L[i, j] = (L[i, j] - dot(L[i, :j], L[j, :j])) / L[j, j]
+                L[i, i] = math.sqrt(L[i, i] - dot(L[i, :i], L[i, :i]))
+                white[i] = (white[i] - dot(L[i, :i], white[:i])) / L[i, i]
+                total -= 0.5 * white[i] ** 2 + math.log(L[i, i])
+            found[k, level] = total
+    return found
+
+
+@compiled("f8[::1](f8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")
+def moved(mean: Array, dx: Array, E: Array, J_r: Array) -> Array:
+    """Return the mean with the error dx put in, and write exp and right Jacobian of its turn into E and J_r.
+
+    The body's rate and angular acceleration stay what they were as seen from the room, to all orders of the turn: they
+    become E' (w + dw + theta x w). A turn that no pixel sees must not alter how the seen balls go on.
+    """
+    now = mean.copy()
+    turn_into(dx[3], dx[4], dx[5], E, J_r)
+    for i in range(3):
+        now[i] += dx[i]
+        for j in range(3):
+            now[3 + 3 * i + j] = mean[3 + 3 * i] * E[0, j] + mean[4 + 3 * i] * E[1, j] + mean[5 + 3 * i] * E[2, j]
+    now[12:24] += dx[6:18]
+    now[25:] += dx[18:]
+    for first in (15, 21):
+        a, b, c = mean[first], mean[first + 1], mean[first + 2]
+        x = now[first] + dx[4] * c - dx[5] * b
+        y = now[first + 1] + dx[5] * a - dx[3] * c
+        z = now[first + 2] + dx[3] * b - dx[4] * a
+        for i in range(3):
+            now[first + i] = E[0, i] * x + E[1, i] * y + E[2, i] * z
+    return now
+
+
+@compiled("f8[:, ::1](f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], i8)")
+def moved_slope(mean: Array, now: Array, E: Array, J_r: Array, size: int) -> Array:
+    """Return d (error about `now`) / d dx (size, size), for the mean, E and J_r that `moved` began with and wrote.
+
+    Source: exp(theta + d) = E exp(J_r d), and w' = E' (w + dw + theta x w) goes by
+        E' d(dw) + ([w']x J_r - E' [w]x) d(theta).
+    """
+    G = np.eye(size)
+    G[3:6, 3:6] = J_r
+    for rows, first in ((9, 15), (15, 21)):
+        w, then = mean[first : first + 3], now[first : first + 3]
+        for i in range(3):
+            p, q = (i + 1) % 3, (i + 2) % 3
+            for j in range(3):
+                G[rows + i, rows + j] = E[j, i]
+                G[rows + i, 3 + j] = then[p] * J_r[q, j] - then[q] * J_r[p, j]
+                u, v = (j + 1) % 3, (j + 2) % 3
+                G[rows + i, 3 + j] -= E[u, i] * w[v] - E[v, i] * w[u]
+    return G
+
+
+@compiled("void(f8[::1], f8[:, ::1], f8[::1])")
+def _tilt(mean: Array, H: Array, y: Array) -> None:
+    """Write the two last rows: the room's vertical, seen in B, has no part along x and y when level.
+
+    Source: R' z has the components of R's last row r; turned by theta it goes by [r]x theta.
+    """
+    rows = len(H)
+    r = mean[9:12]
+    y[rows - 2], y[rows - 1] = -r[0], -r[1]
+    H[rows - 2, 3], H[rows - 2, 4], H[rows - 2, 5] = 0.0, -r[2], r[1]
+    H[rows - 1, 3], H[rows - 1, 4], H[rows - 1, 5] = r[2], 0.0, -r[0]
+
+
+@compiled("Tuple((f8[::1], f8))(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1])")
+def _linear(P: Array, H: Array, R: Array, y: Array, dx: Array, variances: Array) -> tuple[Array, float]:
+    """Return P H' S^-1 y (size,) and its largest step from dx in posterior sigmas; write the posterior variances."""
+    m, n = H.shape
+    HP = np.zeros((m, n + 1))
+    for i in range(m):
+        for k in range(n):
+            for j in range(n):
+                HP[i, j] += H[i, k] * P[k, j]
+        HP[i, n] = y[i]
+    S = innovation_covariance(H, P, R)
+    white = forward(factor(S), HP)
+    new, biggest = np.zeros(n), 0.0
+    for j in range(n):
+        variances[j] = P[j, j]
+        for i in range(m):
+            new[j] += white[i, j] * white[i, n]
+            variances[j] -= white[i, j] ** 2
+        if variances[j] > 0.0:
+            biggest = max(biggest, abs(new[j] - dx[j]) / math.sqrt(variances[j]))
+    return new, biggest
+
+
+@compiled("Tuple((f8[::1], f8[::1], f8[:, ::1], f8[::1]))(f8[::1], f8[:, ::1], f8, f8[::1], f8[:, ::1], i8[::1],"
+          " i8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")  # fmt: skip
+def likeliest(
+    mean: Array, P: Array, T: float, z: Array, R: Array, cameras: Indices, balls: Indices, lags_s: Array,
+    table: Array, points_inB: Array,
+) -> tuple[Array, Array, Array, Array]:  # fmt: skip
+    """Iterate the update about the newest estimate until it stands.
+
+    Args:
+        mean, P: the prior, `State.mean` and (size, size).
+        z: (2n,) pixels.  R: (2n + 2, 2n + 2), the last two rows for the tilt, see `ekf`.
+        T, cameras, balls, lags_s, table, points_inB: as `pixels` takes them.
+    Returns:
+        dx (size,); innovation (2n + 2,) and H (2n + 2, size) there, for one linear update from the prior; the
+        posterior's variances (size,). NaN when a ball comes to lie behind a camera.
+    Source: iterated EKF, Bell and Cathey, IEEE Trans. Automatic Control 38 (1993): with H at the newest estimate and
+        dx its distance from the prior, the linear update's innovation is z - h + H dx (3). About dx, d/d dx
+        is H G, G from `moved_slope` (4).
+    """
+    size, rows = len(P), len(R)
+    dx, y, variances = np.zeros(size), np.zeros(rows), np.zeros(size)
+    H = np.zeros((rows, size))
+    E, J_r, through = np.empty((3, 3)), np.empty((3, 3)), np.empty(9)
+    for _ in range(MAX_ITERATIONS):
+        now = moved(mean, dx, E, J_r)
+        G = moved_slope(mean, now, E, J_r, size)
+        h, slope = pixels(now, T, cameras, balls, lags_s, table, points_inB)
+        if not np.isfinite(h).all():
+            dx[:] = math.nan
+            break
+        H[: rows - TILT_ROWS] = slope
+        _tilt(now, H, y)
+        for i in range(rows - TILT_ROWS):
+            y[i] = z[i] - h[i]
+        for i in range(rows):
+            for j in range(3):
+                by_turn = 0.0
+                for k in range(3):
+                    by_turn += H[i, 3 + k] * G[3 + k, 3 + j] + H[i, 9 + k] * G[9 + k, 3 + j]
+                    by_turn += H[i, 15 + k] * G[15 + k, 3 + j]
+                through[j] = by_turn
+                through[3 + j] = H[i, 9] * G[9, 9 + j] + H[i, 10] * G[10, 9 + j] + H[i, 11] * G[11, 9 + j]
+                through[6 + j] = H[i, 15] * G[15, 15 + j] + H[i, 16] * G[16, 15 + j] + H[i, 17] * G[17, 15 + j]
+            for j in range(3):
+                H[i, 3 + j], H[i, 9 + j], H[i, 15 + j] = through[j], through[3 + j], through[6 + j]  # (4)
+            for j in range(size):
+                y[i] += H[i, j] * dx[j]  # (3)
+        new, biggest = _linear(P, H, R, y, dx, variances)
+        dx = new
+        if biggest < CONVERGED_SIGMA:
+            break
+    return dx, y, H, variances

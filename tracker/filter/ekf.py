@@ -1,0 +1,145 @@
+"""The estimator: a multiplicative, iterated, gated extended Kalman filter on ball pixels.
+
+The state's error has 18 components and one clock offset for each camera but the first (see `state`); attitude errors
+multiply. A measurement is any set of ball sightings, each at its own camera's time. Nothing is stored between calls: a
+state goes in, a new state comes out.
+
+    predict  coast to the new time (predict)
+    update   gate each sighting (batch) -> how brisk is the manoeuvre (manoeuvre), which state is likeliest (fit)
+             -> leave out liars -> one linear update with the converged slope and learn the noise (posterior)
+"""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import combinations
+
+import numpy as np
+from filterpy.kalman import ExtendedKalmanFilter
+
+from tracker.filter.batch import Batch, make_batch
+from tracker.filter.fit import Fit, fit
+from tracker.filter.posterior import settled
+from tracker.filter.predict import Prediction, at_origin
+from tracker.maths.gate import chi2_limit
+from tracker.rig import Rig
+from tracker.state import State
+from tracker.types import BallSighting, Reason, Rejected
+
+MAX_SUSPECTS = 8
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Update:
+    """An updated state, its NIS and degrees of freedom, what was used and what was left out."""
+
+    state: State
+    nis: float
+    dof: int
+    used: tuple[BallSighting, ...]
+    rejected: tuple[Rejected, ...]
+
+
+def update(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig, probability: float) -> Update | Rejected:
+    """Correct a prediction by ball sightings, leaving out those that do not belong.
+
+    Args:
+        ahead: to about the sightings' time.
+        probability: of a true sighting to pass each gate.
+    Returns:
+        Update; Rejected FRAME_GATE when no choice of sightings fits the prediction.
+    Source: each ball is gated on its innovation (Mahalanobis distance, 2 degrees of freedom), as far as the envelope
+        goes. The rest is fitted together. When the sum of squares does not fit its chi-square, the smallest set of
+        sightings is left out with which it does, of equal sets the one that leaves least; sets of up to a third of
+        all are tried, among those without which the sum would fall most, then whole cameras. The prior is broad
+        against a pixel, so it is the marker's rigid shape that finds the liars.
+    """
+    if not sightings:
+        return Rejected(Reason.FRAME_GATE, "no sighting near the prediction", ahead.state.t_ns)
+    ahead = ahead.about_pivot()
+    batch = make_batch(ahead, sightings, rig)
+    distances2 = batch.distances2()
+    limit = chi2_limit(probability, 2)
+    near = [i for i, distance2 in enumerate(distances2) if distance2 <= limit]
+    rejected = [
+        _left_out(sightings[i], rig, distance2, "from the prediction")
+        for i, distance2 in enumerate(distances2)
+        if not distance2 <= limit
+    ]
+    if not near:
+        return Rejected(Reason.FRAME_GATE, "no sighting near the prediction", ahead.state.t_ns)
+    batch = batch.part(near)
+    whole = fit(ahead, batch, rig)
+    if whole is None:
+        return Rejected(Reason.FRAME_GATE, "the fit runs away", ahead.state.t_ns)
+    best: Fit | None = whole
+    if not _fits(whole, probability):
+        best = _without_few(ahead, whole, rig, probability) or _without_a_camera(ahead, batch, rig, probability)
+    if best is None:
+        detail = f"NIS {whole.nis:.0f} with {2 * len(near)} degrees of freedom"
+        return Rejected(Reason.FRAME_GATE, detail, ahead.state.t_ns)
+    for sighting, gain in zip(batch.sightings, whole.gains() if best is not whole else (), strict=False):
+        if sighting not in best.batch.sightings:
+            rejected.append(_left_out(sighting, rig, float(gain), "from what the others say"))
+    state = at_origin(_posterior(ahead.state, best), ahead.pivot_inB)
+    return Update(state, best.nis, len(best.u), best.batch.sightings, tuple(rejected))
+
+
+def _fits(one: Fit, probability: float) -> bool:
+    """Say whether a fit's sum of squares is one that true sightings have."""
+    return one.nis <= chi2_limit(probability, len(one.u))
+
+
+def _without_few(ahead: Prediction, whole: Fit, rig: Rig, probability: float) -> Fit | None:
+    """Return the best fit without up to a third of the sightings, None when none fits."""
+    batch = whole.batch
+    everyone = range(len(batch.sightings))
+    suspects = np.argsort(-whole.gains())[:MAX_SUSPECTS].tolist()
+    for count in range(1, len(everyone) // 3 + 1):
+        tried = [
+            fit(ahead, batch.part([i for i in everyone if i not in left_out]), rig)
+            for left_out in combinations(suspects, count)
+        ]
+        fitting = [one for one in tried if one is not None and _fits(one, probability)]
+        if fitting:
+            return min(fitting, key=lambda one: one.nis)
+    return None
+
+
+def _without_a_camera(ahead: Prediction, batch: Batch, rig: Rig, probability: float) -> Fit | None:
+    """Return the fit without the one camera that contradicts the track, such as one with wrong stamps.
+
+    Manoeuvres explain much of what one camera alone says. So the noise is that expected before, and unless exactly one
+    choice fits, nobody can tell who lies.
+    """
+    fitting = []
+    for camera in sorted(set(batch.cameras.tolist())):
+        others = [i for i, sighting in enumerate(batch.sightings) if sighting.camera != camera]
+        one = fit(ahead, batch.part(others), rig, adapt=False) if others else None
+        if one is not None and _fits(one, probability):
+            fitting.append(one)
+    return fitting[0] if len(fitting) == 1 else None
+
+
+def _left_out(sighting: BallSighting, rig: Rig, distance2: float, where: str) -> Rejected:
+    """Say which ball was left out and how far off it was."""
+    name = rig.marker.balls[sighting.ball].name
+    return Rejected(Reason.GATE, f"{name}: {np.sqrt(distance2):.1f} sigma {where}", sighting.t_ns, sighting.camera)
+
+
+def _posterior(prior: State, best: Fit) -> State:
+    """Take the likeliest state, and the covariance of one linear step there from the prior, by filterpy."""
+    rows = len(best.y)
+    filter_ = copy(_blank_filter(len(best.P), rows))
+    filter_.P = best.P
+    filter_.update(best.y[:, None], lambda _: best.H, lambda _: np.zeros((rows, 1)), R=best.R)
+    mean, P, noise = settled(prior.mean, best.dx, filter_.P, prior.noise, best.batch.cameras, best.u, best.inverse)
+    return prior.at_mean(prior.t_ns, mean, P, best.levels, noise)
+
+
+@lru_cache(maxsize=256)
+def _blank_filter(size: int, rows: int) -> ExtendedKalmanFilter:
+    """Return a filter whose state is 0, to be copied: filterpy takes long to make one, and never changes its arrays."""
+    return ExtendedKalmanFilter(dim_x=size, dim_z=rows)

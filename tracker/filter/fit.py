@@ -1,0 +1,171 @@
+"""The likeliest state between a prediction and a batch of sightings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracker.filter import manoeuvre
+from tracker.filter.batch import Batch
+from tracker.filter.correction import TILT_ROWS, likeliest, log_likelihoods, weighed
+from tracker.filter.manoeuvre import expected, judged
+from tracker.filter.measure import camera_table, marker_points
+from tracker.filter.predict import Prediction
+from tracker.filter.singer import process_noise
+from tracker.maths.compiled import compiled
+from tracker.rig import Rig
+from tracker.state import ATTITUDE, POSITION
+from tracker.types import Array
+
+LEAST_OPEN_TURN_RAD = 0.01
+BEND_SHARE = 0.2  # of a sighting's sigma: less does not matter
+LEAST_DOUBT = 0.2  # of the pixels' own noise: less does not matter
+SHORTEST_S = 1e-3  # a tilt measured twice within less tells no more
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """A fit of a batch: the error dx found, and what leads there from the prior by one linear update.
+
+    P: prior covariance with the manoeuvre's noise in it.  levels: of the manoeuvre, after these sightings.
+    y (2n + 2,), H, R: innovation, slope and covariance of the sightings, then of the tilt.
+    u, inverse: S^-1 y and S^-1 of the sightings.  nis: y' S^-1 y.
+    """
+
+    batch: Batch
+    dx: Array
+    P: Array
+    levels: Array
+    y: Array
+    H: Array
+    R: Array
+    u: Array
+    inverse: Array
+    nis: float
+
+    def gains(self) -> Array:
+        """Return by how much the sum of squares would fall without each sighting (n,).
+
+        Source: u_i' (S^-1_ii)^-1 u_i; Baarda, "A testing procedure for use in geodetic networks", 1968, for blocks.
+        """
+        n = len(self.u) // 2
+        u = self.u.reshape(n, 2)
+        blocks = np.stack([self.inverse[2 * i : 2 * i + 2, 2 * i : 2 * i + 2] for i in range(n)])
+        return np.asarray((u * np.linalg.solve(blocks, u[:, :, None])[:, :, 0]).sum(axis=1))
+
+    def log_likelihood(self) -> float:
+        """Return the log likelihood of the innovations, up to a constant."""
+        return 0.5 * (float(np.linalg.slogdet(self.inverse)[1]) - self.nis)
+
+
+def fit(ahead: Prediction, batch: Batch, rig: Rig, *, adapt: bool = True) -> Fit | None:
+    """Fit a batch; None when the fit runs away.
+
+    adapt: let the batch itself tell how brisk the manoeuvre is.
+    Two balls do not show the turn about their line. Then roll and pitch, which stay within bounds over a flight, bound
+    it, and where its curvature shows, that goes into the noise and the fit is made again (`_bend`).
+    """
+    process, n = ahead.process, len(batch.z)
+    # A tilt that lasts, as white noise of the same spectral density.
+    tilt = 2.0 * process.tilt_rad**2 * process.tilt_s / max(ahead.dt, SHORTEST_S)
+    levels, P, R, doubtful = _prepared(
+        ahead.state.levels, manoeuvre.variances(process), batch.y, batch.A, batch.B, batch.R, batch.path, batch.doubt,
+        ahead.P_coasted, ahead.dt, process.manoeuvre_s, tilt, adapt, bool(ahead.pivot_inB.any()),
+    )  # fmt: skip
+    agreed = _fitted(ahead, batch, rig, levels, P, R)
+    if not doubtful:
+        return agreed
+    R[:n, :n] += batch.doubt
+    doubted = _fitted(ahead, batch, rig, levels, P, R)
+    return _likelier(agreed, doubted)
+
+
+@compiled("Tuple((f8[:, ::1], f8[:, ::1], f8[:, ::1], b1))(f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1],"
+          " f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8, f8, f8, b1, b1)")  # fmt: skip
+def _prepared(
+    levels: Array, of: Array, y: Array, A: Array, B: Array, R_pixels: Array, path: Array, doubt: Array,
+    P_coasted: Array, dt: float, T: float, tilt: float, adapt: bool, unseen: bool,
+) -> tuple[Array, Array, Array, bool]:  # fmt: skip
+    """Return levels, prior covariance, noise of pixels and tilt, and whether the doubt of the clocks matters.
+
+    tilt: variance of roll and of pitch.  unseen: whether a turn is open; then axes that are seen to be quiet do not
+    tell whether it is, and the level of rotation is only raised.  The others as `Batch`, `Prediction` and `manoeuvre`
+    name them.
+    """
+    n = len(y)
+    if adapt and dt > 0.0:
+        before, levels = levels, judged(levels, log_likelihoods(y, A, B, of, expected(levels, of)))
+        if unseen and expected(levels, of)[1] < expected(before, of)[1]:
+            levels[1] = before[1]
+    translation, rotation = expected(levels, of)
+    R, noise, doubts = np.zeros((n + TILT_ROWS, n + TILT_ROWS)), 0.0, 0.0
+    for i in range(n):
+        for j in range(n):
+            R[i, j] = R_pixels[i, j] + translation * path[0, i, j] + rotation * path[1, i, j]
+        noise, doubts = noise + R[i, i], doubts + doubt[i, i]
+    for i in range(n, n + TILT_ROWS):
+        R[i, i] = tilt
+    P = P_coasted + process_noise(len(P_coasted), dt, T, translation, rotation)
+    return levels, P, R, not doubts < LEAST_DOUBT * noise
+
+
+def _likelier(agreed: Fit | None, doubted: Fit | None) -> Fit | None:
+    """Choose between a fit that takes the cameras' clocks to agree and one that leaves it open.
+
+    While speed and offset are both unknown, doubt would throw away all that two cameras know together; nearly always
+    they do show one instant, and where they do not, the rays to three moving balls miss each other.
+    """
+    if agreed is None or doubted is None:
+        return doubted or agreed
+    return agreed if agreed.log_likelihood() > doubted.log_likelihood() else doubted
+
+
+def _fitted(ahead: Prediction, batch: Batch, rig: Rig, levels: Array, P: Array, R: Array) -> Fit | None:
+    """Fit with a given prior covariance P and noise R, which is not kept; None when the fit runs away."""
+    n, R = len(batch.z), R.copy()
+    dx, y, H, variances = _solve(ahead, batch, rig, P, R)
+    if not np.isfinite(dx).all():
+        return None
+    if float(variances[ATTITUDE].max()) > LEAST_OPEN_TURN_RAD**2 / 3.0:
+        bend_px = _bend(ahead, batch, rig, dx, P, H, R)
+        if bend_px is not None:
+            R[:n, :n] += np.outer(bend_px, bend_px)
+            dx, y, H, variances = _solve(ahead, batch, rig, P, R)
+            if not np.isfinite(dx).all():
+                return None
+    u, inverse, nis = weighed(y, H, P, R)
+    return Fit(batch, dx, P, levels, y, H, R, u, inverse, nis)
+
+
+def _solve(ahead: Prediction, batch: Batch, rig: Rig, P: Array, R: Array) -> tuple[Array, Array, Array, Array]:
+    return likeliest(
+        ahead.state.mean, P, ahead.process.manoeuvre_s, batch.z, R, batch.cameras, batch.balls, batch.lags_s,
+        camera_table(rig), marker_points(rig) - ahead.pivot_inB,
+    )  # fmt: skip
+
+
+def _bend(ahead: Prediction, batch: Batch, rig: Rig, dx: Array, P: Array, H: Array, R: Array) -> Array | None:
+    """Return how far a turn that a fit left open bends the balls' paths from straight (2n,) [px], or None if little.
+
+    Linearised, a ball off that turn's axis moves square to its arm; truly it moves on a circle, which a filter that
+    believes its tangent takes for knowledge of the arm's direction. Arms are from the pivot, so a turn about two balls
+    bends nothing; what one camera alone leaves open does.
+
+    Source: turned by phi about the unit axis e, the arm m goes to second order by phi^2/2 (e (e.m) - m). For phi
+        normal with variance s, E[phi^4] = 3 s^2, so the rms of that is sqrt(3)/2 s |...|, the mean counted in. s, e:
+        the largest eigenvalue of the attitude's covariance and its vector.
+    """
+    HP = H @ P
+    posterior = P[ATTITUDE, ATTITUDE] - HP[:, ATTITUDE].T @ np.linalg.solve(HP @ H.T + R, HP[:, ATTITUDE])
+    variances, axes = np.linalg.eigh(posterior)
+    largest, axis = float(variances[2]), axes[:, 2]
+    if largest < LEAST_OPEN_TURN_RAD**2:
+        return None
+    arms = marker_points(rig) - ahead.pivot_inB
+    R_BtoW = ahead.state.moved(dx).R_BtoW
+    sag_inW = (arms @ np.outer(axis, axis) - arms) * (largest * np.sqrt(3.0) / 2.0) @ R_BtoW.T
+    n = len(batch.z)
+    J = H[:n, POSITION].reshape(-1, 2, 3)
+    bend_px = np.asarray((J @ sag_inW[batch.balls][:, :, None]).reshape(-1))
+    return bend_px if bool((np.abs(bend_px) > BEND_SHARE * np.sqrt(np.diag(R)[:n])).any()) else None

@@ -1,0 +1,53 @@
+"""The last few updates of a track, so that a late frame can be put in where it belongs."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+from tracker.filter.ekf import Update
+from tracker.state import State
+from tracker.types import BallSighting
+
+KEPT = 8  # updates
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Later:
+    """An update taken back: when it was and the sightings that made it."""
+
+    t_ns: int
+    sightings: tuple[BallSighting, ...]
+
+
+class History:
+    """States after the newest updates, in order of time, with what made them."""
+
+    def __init__(self) -> None:
+        self._updates: deque[Update] = deque(maxlen=KEPT)
+
+    @property
+    def newest(self) -> State | None:
+        """Return the newest state, None before the first."""
+        return self._updates[-1].state if self._updates else None
+
+    def forgot(self, t_ns: int) -> bool:
+        """Say whether an instant lies before all that is kept."""
+        return bool(self._updates) and t_ns < self._updates[0].state.t_ns
+
+    def remember(self, update: Update) -> None:
+        """Add the newest update."""
+        self._updates.append(update)
+
+    def restart(self, update: Update) -> None:
+        """Forget all and begin with an update."""
+        self._updates.clear()
+        self._updates.append(update)
+
+    def back_to(self, t_ns: int) -> list[Later]:
+        """Take back the updates after an instant that is not forgotten; return them in order of time."""
+        later: list[Later] = []
+        while self._updates and self._updates[-1].state.t_ns > t_ns:
+            update = self._updates.pop()
+            later.insert(0, Later(update.state.t_ns, update.used))
+        return later

@@ -1,0 +1,31 @@
+"""The state after an update, put together from what the fit and the filter found, compiled."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tracker.filter.correction import innovation_covariance, moved, moved_slope
+from tracker.filter.measure import Indices
+from tracker.filter.noise import learned
+from tracker.maths.compiled import compiled
+from tracker.types import Array
+
+
+@compiled("Tuple((f8[::1], f8[:, ::1], f8[:, ::1]))(f8[::1], f8[::1], f8[:, ::1], f8[:, ::1],"
+          " i8[::1], f8[::1], f8[:, ::1])")  # fmt: skip
+def settled(
+    mean: Array, dx: Array, P: Array, noise: Array, cameras: Indices, u: Array, inverse: Array
+) -> tuple[Array, Array, Array]:
+    """Return mean, covariance and the cameras' noise after an update.
+
+    Args:
+        mean, dx: the prior's, and the error found.  P: after the update, about the prior's attitude.
+        noise, cameras, u, inverse: as `learned` takes them.
+
+    Source: the error about the new mean is G d, see `moved_slope`.
+    """
+    E, J_r = np.empty((3, 3)), np.empty((3, 3))
+    now = moved(mean, dx, E, J_r)
+    turn = moved_slope(mean, now, E, J_r, len(P))
+    after = innovation_covariance(turn, P, np.zeros(P.shape))
+    return now, after, learned(noise, cameras, u, inverse)

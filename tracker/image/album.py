@@ -1,0 +1,89 @@
+"""The templates that serve for the balls one camera sees: the right one, or for some rounds the one next to it.
+
+A vehicle that moves crosses the steps of radius and bearing for ever. Were each template drawn when it is first wanted,
+some rounds would draw a dozen. A neighbour does nearly as well: what it is off is put right to the second order
+(`tracker/image/reading.py`), and balls a step of bearing apart are shaded alike. So a flight under way draws one at a
+time. What is drawn when depends on the rounds alone, never on the time they took: the same input gives the same poses.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from tracker.camera import Camera
+from tracker.image.appearance import BEARING_STEP_RAD, Appearance
+from tracker.image.light import Light
+from tracker.image.template import Template, draw, sampling_of, steps_of
+from tracker.image.view import RADIUS, RAY_X, RAY_Y
+
+KEPT = 256  # templates, of about 100 kB each: what a flight through a room shows
+NEAR = 1  # steps of radius and blur together, and of bearing
+
+
+class Wanted(NamedTuple):
+    """Which template: steps of radius, blur and bearing; side of the box, samples a pixel, and the light."""
+
+    radius_steps: int
+    blur_steps: int
+    x_steps: int
+    y_steps: int
+    box_px: int
+    per_px: int
+    light: Light
+
+
+class Album:
+    """Draws and keeps the templates for one camera.
+
+    draws_left: how many may still be drawn of those that a neighbour can stand in for; None for all.
+    """
+
+    def __init__(self, camera: Camera) -> None:
+        self.draws_left: int | None = None
+        self._camera = camera
+        self._serving: dict[tuple[int, int], tuple[Wanted, Template]] = {}  # by ball and side of the box
+        self._drawn: dict[Wanted, Template] = {}
+
+    def serve(self, ball: int, view: Sequence[float], appearance: Appearance) -> tuple[Template, Template]:
+        """Return the templates of a ball's brightness and of its colour.
+
+        view: a row of `view.expected_views`.
+        """
+        r, x_steps, y_steps = appearance.response, 0, 0
+        if appearance.shown.count:
+            x_steps, y_steps = round(view[RAY_X] / BEARING_STEP_RAD), round(view[RAY_Y] / BEARING_STEP_RAD)
+        templates = []
+        for group, (blur_px, box_px) in enumerate(((r.luma_px, 1), (r.chroma_px, r.block_px))):
+            per_px = sampling_of(view[RADIUS], box_px)
+            wanted = Wanted(*steps_of(view[RADIUS], blur_px), x_steps, y_steps, box_px, per_px, appearance.shown)
+            templates.append(self._template((ball, group), wanted, view, appearance))
+        return templates[0], templates[1]
+
+    def _template(
+        self, slot: tuple[int, int], wanted: Wanted, view: Sequence[float], appearance: Appearance
+    ) -> Template:
+        """Return the template wanted; or the one that has served, if that is near and no more may be drawn."""
+        serving = self._serving.get(slot)
+        if serving is not None and serving[0] == wanted:
+            return serving[1]
+        template = self._drawn.get(wanted)
+        if template is None:
+            if self.draws_left is not None and serving is not None and _near(serving[0], wanted):
+                if self.draws_left <= 0:
+                    return serving[1]
+                self.draws_left -= 1
+            shades = appearance.shades(self._camera, view[RAY_X], view[RAY_Y])
+            template = draw(wanted.radius_steps, wanted.blur_steps, wanted.box_px, wanted.per_px, shades)
+            if len(self._drawn) >= KEPT:
+                self._drawn.pop(next(iter(self._drawn)))
+            self._drawn[wanted] = template
+        self._serving[slot] = wanted, template
+        return template
+
+
+def _near(serving: Wanted, wanted: Wanted) -> bool:
+    """Say whether a template is so like another that it can stand in for it: a step of radius or blur, not of both."""
+    apart = abs(serving.radius_steps - wanted.radius_steps) + abs(serving.blur_steps - wanted.blur_steps)
+    turned = max(abs(serving.x_steps - wanted.x_steps), abs(serving.y_steps - wanted.y_steps))
+    return apart <= NEAR and turned <= NEAR and serving.box_px == wanted.box_px

@@ -1,0 +1,89 @@
+"""How balls look to one camera, learned while tracking: the light that it sees and how it answers to it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+
+import numpy as np
+
+from tracker.camera import Camera
+from tracker.image.centre import Centre
+from tracker.image.lesson import light_on, sample_of, sharper
+from tracker.image.light import Light, ray_frame
+from tracker.image.patch import Expected, Response, cut, detail_of, extent_of
+from tracker.image.template import FLAT, Shades
+from tracker.types import Array, Image
+
+BEARING_STEP_RAD = 0.07  # rays closer than this share a ball's shading
+PUBLISH_AT = (3, 6, 9, 12, 15, 18, 36, 72, 144)  # balls learned when templates follow the light, then every last
+BLUR_STEP_PX, FIRST_STEP_PX = 0.03, 0.15
+DETAIL_SHARE = 0.05  # of the newest ball in what is known of the camera's colour detail
+MISFIT_MAX = 2.0  # an image that fits no ball teaches nothing
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Appearance:
+    """What is known of one camera so far.
+
+    response: the camera's.
+    light: learned.  shown: the light that templates are drawn by; it follows `light` in few, growing steps.
+    """
+
+    response: Response = field(default_factory=Response)
+    light: Light = field(default_factory=Light)
+    shown: Light = field(default_factory=Light)
+
+    def shades(self, camera: Camera, x: float, y: float) -> Shades:
+        """Return how a ball is shaded that the camera sees along the ray (x, y, 1)."""
+        if not self.shown.count:
+            return FLAT
+        return _shades(self.shown, camera, round(x / BEARING_STEP_RAD), round(y / BEARING_STEP_RAD))
+
+    def with_gamma(self, gamma: float) -> Appearance:
+        """Return it under another gamma, its light ready to be learned anew."""
+        if gamma == self.response.gamma:
+            return self
+        return replace(self, response=replace(self.response, gamma=gamma), light=self.light.faded())
+
+    def expected_like(self, ball: Expected, camera: Camera, uv_px: Array) -> Expected:
+        """Return what would be expected of a ball, seen at uv_px (2,), if it looked as is known here."""
+        place = float(uv_px[0]), float(uv_px[1])
+        shades = self.shades(camera, *_ray(ball, camera))
+        return replace(ball, uv_px=place, shades=shades, response=self.response, drawn=None)
+
+    def learned(self, image: Image, camera: Camera, ball: Expected, found: Centre) -> Appearance:
+        """Return what is known after one more ball.
+
+        Args:
+            image: the camera's, BGR.
+            ball, found: what was expected of the ball and what its fit gave.
+        """
+        if found.misfit > MISFIT_MAX:
+            return self
+        extent = extent_of(ball)
+        centre = float(found.uv_px[0]) - extent.u, float(found.uv_px[1]) - extent.v
+        sample = sample_of(cut(image, extent, ball.response), ball, centre)
+        response = sharper(sample, max(BLUR_STEP_PX, FIRST_STEP_PX / (1.0 + self.light.count / 3.0)))
+        detail = response.detail + DETAIL_SHARE * (detail_of(image, extent) - response.detail)
+        response = replace(response, detail=detail)
+        R_RtoW = ray_frame(*_ray(ball, camera), camera.R_CtoW)
+        equations = light_on(sample, self.light.lamp_seen(R_RtoW))
+        light = self.light if equations is None else self.light.learned(*equations, R_RtoW)
+        due = light.count in PUBLISH_AT or light.count % PUBLISH_AT[-1] == 0
+        shown = light if due and light.trusted else self.shown
+        return Appearance(response, light, shown)
+
+
+def _ray(ball: Expected, camera: Camera) -> tuple[float, float]:
+    """Return the ray (x, y, 1) to a ball: the one expected, or where its place in the image leads."""
+    if ball.ray is not None:
+        return ball.ray
+    x, y, z = camera.bearings(np.array([ball.uv_px]))[0].tolist()
+    return x / z, y / z
+
+
+@lru_cache(maxsize=4096)
+def _shades(light: Light, camera: Camera, x_steps: int, y_steps: int) -> Shades:
+    """Return the shades along a rounded bearing; light and camera are told apart by identity."""
+    return light.shades(ray_frame(x_steps * BEARING_STEP_RAD, y_steps * BEARING_STEP_RAD, camera.R_CtoW))

@@ -1,0 +1,111 @@
+"""Sub-pixel centres of balls, by fitting their images.
+
+A pixel near the edge shows part ball, part room. Which part is unknown where the ball is dark and so is the room, so
+the whole patch is fitted at once: coverage times a shaded ball, the rest times a sloping background; brightness and
+the two colour differences apart, because cameras blur colour more (Bayer filters, JPEG 4:2:0). The linear coefficients
+are solved for inside (variable projection), the centre by Gauss-Newton, and pixels that fit no ball (tubes, writing)
+lose their weight (Tukey's biweight): `tracker/image/newton.py`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from enum import Enum, auto
+
+import numpy as np
+
+from tracker.image import newton
+from tracker.image.newton import gauss_newton, squares_at
+from tracker.image.patch import Expected, Patch, cut, extent_of, fits_in
+from tracker.image.reading import CHROMA_VAR, LUMA_VAR
+from tracker.image.template import Template, template_for, variance_of
+from tracker.types import Array, Image, Reason, frozen_array
+
+MAX_SHIFT_PX = 1.5
+
+
+class Group(Enum):
+    """What is blurred alike."""
+
+    BRIGHTNESS = auto()
+    COLOUR = auto()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Centre:
+    """A fitted ball.
+
+    uv_px (2,), cov_px (2, 2) [px^2] of the fit alone; misfit: chi2 per degree of freedom.
+    """
+
+    uv_px: Array
+    cov_px: Array
+    misfit: float
+
+
+def numbers_of(ball: Expected) -> Array:
+    """Return what is known of a ball as compiled code takes it, see `reading.BALL_SIZE`."""
+    r = ball.response
+    variances = variance_of(r.luma_px, 1), variance_of(r.chroma_px, r.block_px)
+    return np.array((ball.radius_px, *variances, *ball.streak_px))
+
+
+def templates_of(ball: Expected) -> tuple[Template, Template]:
+    """Return the templates of a ball's brightness and of its colour."""
+    if ball.drawn is not None:
+        return ball.drawn
+    r = ball.response
+    luma = template_for(ball.radius_px, r.luma_px, ball.shades)
+    return luma, template_for(ball.radius_px, r.chroma_px, ball.shades, r.block_px)
+
+
+def fit_centre(image: Image, ball: Expected) -> Centre | Reason:
+    """Fit the centre of a ball.
+
+    Args:
+        image: (height, width, 3) BGR.
+        ball: what is known of it.
+    Returns:
+        Centre; AT_BORDER when its patch leaves the image, NO_BALL when the fit runs away.
+    Source: Golub, Pereyra, "Separable nonlinear least squares", Inverse Problems 19 (2003), with Kaufman's
+        approximation of the Jacobian; weights: Tukey's biweight.
+    """
+    extent = extent_of(ball)
+    if not fits_in(image, extent):
+        return Reason.AT_BORDER
+    patch, fit = cut(image, extent, ball.response), np.empty(6)
+    luma, chroma = templates_of(ball)
+    drawn = luma.fine, luma.made, chroma.fine, chroma.made
+    gauss_newton(patch.bright, patch.colour, *drawn, numbers_of(ball), extent.du, extent.dv, fit)
+    du, dv, cov_uu, cov_uv, cov_vv, misfit = fit.tolist()
+    if not math.hypot(du - extent.du, dv - extent.dv) <= MAX_SHIFT_PX:
+        return Reason.NO_BALL
+    uv_px = frozen_array((extent.u + du, extent.v + dv))
+    return Centre(uv_px, frozen_array(((cov_uu, cov_uv), (cov_uv, cov_vv))), misfit)
+
+
+def misfit_at(patch: Patch, ball: Expected, centre: tuple[float, float]) -> float:
+    """Return the sum of squares that a ball's fit leaves in its brightness at a given centre.
+
+    centre: from the patch's middle pixel [px].
+    """
+    luma, _ = templates_of(ball)
+    return squares_at(patch.bright, luma.fine, luma.made, numbers_of(ball), LUMA_VAR, *centre)
+
+
+def slopes_at(patch: Patch, ball: Expected, centre: tuple[float, float], group: Group) -> tuple[Array, float]:
+    """Return how a ball's fit at a given centre changes with what it was given.
+
+    Args:
+        centre: from the patch's middle pixel [px].
+        group: the pixels that are looked at.
+    Returns:
+        slopes (2, n) of the brightness, or of the blue difference, by the centre [1/px]; and that of half the sum of
+        squares left, by the variance of the blur [1/px^2]: positive when a sharper ball would fit better.
+    """
+    bright = group is Group.BRIGHTNESS
+    pixels, template = (patch.bright if bright else patch.colour), templates_of(ball)[0 if bright else 1]
+    slopes, variance = np.empty((2, pixels.shape[1])), LUMA_VAR if bright else CHROMA_VAR
+    by_variance = newton.slopes_at(pixels, template.fine, template.made, numbers_of(ball), variance, *centre, slopes)
+    return slopes, by_variance

@@ -1,0 +1,115 @@
+"""The cameras' eyes: they look for balls as they know them, and learn from those that were found."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from tracker.image.album import Album
+from tracker.image.appearance import MISFIT_MAX
+from tracker.image.look import Fitted, Look, look_near
+from tracker.image.rivals import first_rivals
+from tracker.image.sight import MISFIT
+from tracker.image.tint import Gains, Tint, core_colour
+from tracker.image.view import RADIUS, unknown_streak_px
+from tracker.rig import Rig
+from tracker.state import State
+from tracker.types import Array, Frame
+
+LIGHT_BALLS = 2  # a single ball that is something else would tell of a light that is not there
+LEARN_ALL = 72  # balls of each camera; then
+LEARN_EVERY = 4  # rounds one ball
+BLIND_PX = 0.5  # of the streak's sigma: how fast the balls move is not known
+SMEAR_DOUBT = 0.1  # of an unknown smear: what it moves the centre of a shaded ball, one sigma
+LONG_STREAK_PX = 0.7  # an image smeared further than this, taken for a still one, teaches wrong
+
+
+class Eyes:
+    """What each camera of a rig knows of how balls look to it."""
+
+    def __init__(self, rig: Rig) -> None:
+        self._rig = rig
+        self._rivals = [first_rivals() for _ in rig.cameras]
+        self._albums = [Album(camera) for camera in rig.cameras]
+        self._tints = [Tint() for _ in rig.cameras]
+        self._turn = 0
+        self._taught_blindly = False
+
+    @property
+    def lessons_due(self) -> int:
+        """Return how often the first images should be gone over again, since nothing else is known yet."""
+        return max(rivals.lessons_due for rivals in self._rivals)
+
+    @property
+    def exposure_s(self) -> float:
+        """Return how long the slowest shutter stands open, as learned [s]."""
+        return max(rivals.best.response.exposure_s for rivals in self._rivals)
+
+    @property
+    def _settled(self) -> bool:
+        """Say whether it is known how balls look, so that little is left to learn."""
+        return all(rivals.settled and rivals.best.light.count >= LEARN_ALL for rivals in self._rivals)
+
+    @property
+    def gains(self) -> tuple[Gains, ...]:
+        """Return the colour of the light in each camera."""
+        return tuple([tint.gains for tint in self._tints])
+
+    def other_gains(self, number: int) -> tuple[Gains, ...]:
+        """Return another light to look for balls under, for each camera; numbers go round, the nearest first."""
+        return tuple(tint.other(number) for tint in self._tints)
+
+    def suppose(self, gains: Sequence[Gains]) -> None:
+        """Take the light in each camera to be so."""
+        self._tints = [replace(tint, gains=one) for tint, one in zip(self._tints, gains, strict=True)]
+
+    def look(self, frames: Sequence[Frame], state: State) -> Look:
+        """Find each ball in each image where a state expects it."""
+        whose = frames[self._turn % len(frames)].camera  # of those that see now: free-running ones are a round each
+        for index, album in enumerate(self._albums):
+            album.draws_left = int(index == whose) if self._settled else None
+        look = look_near(frames, self._rig, state, [rivals.best for rivals in self._rivals], self._albums, self.gains)
+        doubt_px = SMEAR_DOUBT * self._streak_px(state)
+        return look.doubted(doubt_px) if doubt_px > SMEAR_DOUBT * BLIND_PX else look
+
+    def blind(self, state: State) -> bool:
+        """Say whether a state does not know how far the balls' images are smeared."""
+        return self._streak_px(state) > BLIND_PX
+
+    def _streak_px(self, state: State) -> float:
+        """Return one sigma of how far the balls' images may be smeared that the state does not know of [px]."""
+        return unknown_streak_px(state, self._rig, [rivals.best.response.exposure_s for rivals in self._rivals])
+
+    def learn(self, fitted: Sequence[Fitted], *, blindly: bool) -> None:
+        """Learn how balls look: from every one at first, then from one in turn every few rounds.
+
+        blindly: how fast they moved was not known. It is better than nothing, and forgotten if they did move.
+        """
+        self._turn += 1
+        self._follow_the_light(fitted)
+        if self._taught_blindly and not blindly:
+            self._taught_blindly = False
+            if any(one.streak_px > LONG_STREAK_PX for one in fitted):
+                self._rivals = [first_rivals() for _ in self._rig.cameras]
+        self._taught_blindly |= blindly and not all(rivals.settled for rivals in self._rivals)
+        if self._settled:
+            fitted = [fitted[self._turn // LEARN_EVERY % len(fitted)]] if self._turn % LEARN_EVERY == 0 else []
+        for one in fitted:
+            index = one.frame.camera
+            camera, image = self._rig.cameras[index], one.frame.image
+            self._rivals[index] = self._rivals[index].learned(image, camera, one.expected(camera), one.centre)
+
+    def _follow_the_light(self, fitted: Sequence[Fitted]) -> None:
+        """Learn the light from the balls' colours: of each camera at first, then of those that see now in turn."""
+        cameras = sorted({one.frame.camera for one in fitted})
+        if cameras and all(self._tints[camera].settled for camera in cameras):
+            cameras = [cameras[self._turn % len(cameras)]]
+        for camera in cameras:
+            seen = [one for one in fitted if one.frame.camera == camera and float(one.fit[MISFIT]) <= MISFIT_MAX]
+            if len(seen) >= LIGHT_BALLS:
+                self._tints[camera] = self._tints[camera].learned([(one.sighting.ball, _colour(one)) for one in seen])
+
+
+def _colour(one: Fitted) -> Array:
+    u, v = one.sighting.uv_px.tolist()
+    return core_colour(one.frame.image, u, v, one.view[RADIUS])

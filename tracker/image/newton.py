@@ -1,0 +1,289 @@
+"""The fit of one ball's image, compiled: linear coefficients solved for inside, the centre by Gauss-Newton."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.image.patch import LUMA, TRUST, X, Y
+from tracker.image.reading import CHROMA_VAR, LUMA_VAR, read
+from tracker.maths.compiled import compiled
+from tracker.maths.solve import cholesky, dot, lower, solve
+from tracker.types import Array
+
+PLANE = 3  # terms of the background
+TUKEY = 4.685  # of the robust sigma: 95 % efficient where all is well (Huber, Ronchetti, "Robust Statistics", 2009)
+LEAST_WEIGHT = 1e-3
+ITERATIONS = 5
+LATTICE = 8  # places per pixel where a ball is linearised
+FARTHEST_PX = 1.5  # a centre further from the middle pixel has run away
+ROUGH_PX = 0.5
+CONVERGED_PX = 0.02  # of the last step; what is left after it is far smaller
+RIDGE = 1.0 + 1e-9
+
+
+@compiled("i8(i8)")
+def rows_of(shapes: int) -> int:
+    """Return the rows that `draw_at` fills: the model, and of each shape its slopes by u, by v and by variance."""
+    return 4 * shapes + PLANE
+
+
+@compiled("void(f8[:, ::1], Array(float32, 3, 'C', True), f8[::1], f8[::1], i8, f8, f8, f8[:, ::1])")
+def draw_at(
+    pixels: Array, fine: NDArray[np.float32], made: Array, ball: Array, variance: int, u: float, v: float, drawn: Array
+) -> None:
+    """Draw a ball on a patch (..., n) with its centre at (u, v); arguments as for `reading.read`.
+
+    Fills in drawn (4p + 3, n): the model, which is the shapes (p) and the background's plane where the ball is not,
+    then the shapes' slopes (p) by the centre's u, by its v, and by the blur's variance.
+    """
+    p = fine.shape[2]
+    m = p + PLANE
+    read(
+        fine,
+        made,
+        ball,
+        variance,
+        u,
+        v,
+        pixels,
+        drawn[:p],
+        drawn[m : m + p],
+        drawn[m + p : m + 2 * p],
+        drawn[m + 2 * p :],
+    )
+    for i in range(pixels.shape[1]):
+        bare = 1.0 - drawn[0, i]
+        drawn[p, i] = bare
+        drawn[p + 1, i] = bare * pixels[X, i]
+        drawn[p + 2, i] = bare * pixels[Y, i]
+
+
+@compiled("void(f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
+def fit_linear(pixels: Array, model: Array, weight: Array, weighted: Array, factor: Array, coefficients: Array) -> None:
+    """Solve for the linear coefficients of each channel (channels, m).
+
+    Args:
+        model (m, n).  weight (n,): of each pixel.  weighted (m, n): the model with them, filled in.
+        factor (m, m): Cholesky's, filled in.
+    """
+    for j in range(len(model)):
+        for i in range(len(weight)):
+            weighted[j, i] = weight[i] * model[j, i]
+        for k in range(j + 1):
+            factor[j, k] = dot(weighted[j], model[k])
+        factor[j, j] *= RIDGE
+        for channel in range(len(coefficients)):
+            coefficients[channel, j] = dot(weighted[j], pixels[LUMA + channel])
+    cholesky(factor)
+    for channel in range(len(coefficients)):
+        solve(factor, coefficients[channel])
+
+
+@compiled("void(f8[:, ::1], f8[::1], f8[::1], f8[::1])")
+def residual(model: Array, c: Array, seen: Array, rest: Array) -> None:
+    """Fill in what the model with coefficients c (m,) leaves of what was seen (n,)."""
+    for i in range(len(rest)):
+        rest[i] = seen[i]
+    for j in range(len(model)):
+        for i in range(len(rest)):
+            rest[i] -= c[j] * model[j, i]
+
+
+@compiled("void(f8[:, ::1], f8[:, ::1], f8[::1], f8[::1])")
+def slope_of(pixels: Array, by: Array, c: Array, slope: Array) -> None:
+    """Fill in the slope (n,) of the model with coefficients c (m,), from the shapes' slopes (p, n).
+
+    The background's rows are (1 - coverage) (1, x, y); their slopes are minus the coverage's times (1, x, y).
+    """
+    p = len(by)
+    for i in range(len(slope)):
+        slope[i] = (c[0] - c[p] - c[p + 1] * pixels[X, i] - c[p + 2] * pixels[Y, i]) * by[0, i]
+    for j in range(1, p):
+        for i in range(len(slope)):
+            slope[i] += c[j] * by[j, i]
+
+
+@compiled(
+    "void(f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], i8, f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1],"
+    "f8[::1], f8[::1])"
+)
+def _add_channel(
+    pixels: Array, drawn: Array, weight: Array, weighted: Array, channel: int, factor: Array, c: Array, rows: Array,
+    T: Array, squares: Array, normal: Array,
+) -> None:  # fmt: skip
+    """Add what one channel says of the centre.
+
+    Args:
+        drawn: by `draw_at`.  weighted, factor, c (m,): from `fit_linear`.
+        rows (3, n), T (2, m): overwritten.
+        squares (n,): misfit of each pixel, added to.
+        normal (5,): information uu, uv, vv and gradient u, v of the centre, added to.
+    """
+    m, rest, slope_u, slope_v = len(c), rows[0], rows[1], rows[2]
+    p = m - PLANE
+    residual(drawn[:m], c, pixels[LUMA + channel], rest)
+    slope_of(pixels, drawn[m : m + p], c, slope_u)
+    slope_of(pixels, drawn[m + p : m + 2 * p], c, slope_v)
+    uu = uv = vv = ur = vr = 0.0
+    for i in range(len(weight)):
+        u, v = weight[i] * slope_u[i], weight[i] * slope_v[i]
+        uu += u * slope_u[i]
+        uv += u * slope_v[i]
+        vv += v * slope_v[i]
+        ur += u * rest[i]
+        vr += v * rest[i]
+        squares[i] += (pixels[TRUST, i] * rest[i]) ** 2
+    # What the linear coefficients can follow says nothing of the centre.
+    for j in range(m):
+        T[0, j], T[1, j] = dot(weighted[j], slope_u), dot(weighted[j], slope_v)
+    lower(factor, T[0])
+    lower(factor, T[1])
+    normal[0] += uu - dot(T[0], T[0])
+    normal[1] += uv - dot(T[0], T[1])
+    normal[2] += vv - dot(T[1], T[1])
+    normal[3] += ur
+    normal[4] += vr
+
+
+@compiled("void(f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[::1], f8[::1])")
+def _linearise(pixels: Array, drawn: Array, tukey: Array, work: Array, squares: Array, normal: Array) -> None:
+    """Linearise the brightness or the colour of a patch about the centre that a ball was drawn at, see `draw_at`.
+
+    work (m + 4, n): overwritten.  Fills in squares (n,) and normal (5,) as `_add_channel` does.
+    """
+    m, channels = len(work) - 4, len(pixels) - LUMA
+    weight = work[m + 3]
+    for i in range(len(weight)):
+        weight[i] = (tukey[i] * pixels[TRUST, i]) ** 2
+    factor, coefficients, T = np.empty((m, m)), np.empty((channels, m)), np.empty((2, m))
+    squares[:] = 0.0
+    normal[:] = 0.0
+    fit_linear(pixels, drawn[:m], weight, work[:m], factor, coefficients)
+    for channel in range(channels):
+        c = coefficients[channel]
+        _add_channel(pixels, drawn, weight, work[:m], channel, factor, c, work[m : m + 3], T, squares, normal)
+
+
+@compiled("f8(f8[::1], f8[::1], i8, i8, f8[::1])")
+def _misfit(squares: Array, tukey: Array, channels: int, shapes: int, normal: Array) -> float:
+    """Return chi2 per degree of freedom of brightness or colour, and weaken normal (5,) where it is above 1."""
+    freedom, total = -float(channels * (shapes + PLANE)), 0.0
+    for i in range(len(squares)):
+        freedom += channels * tukey[i] ** 2
+        total += squares[i] * tukey[i] ** 2
+    misfit = total / max(1.0, freedom)
+    normal /= max(1.0, misfit)
+    return misfit
+
+
+@compiled("f8(f8[::1], i8)")
+def _scale(squares: Array, channels: int) -> float:
+    """Return the median of the squares by channel, or 1 when it is less: mostly it is, and counting shows that."""
+    small = 0
+    for i in range(len(squares)):
+        small += squares[i] <= channels
+    return 1.0 if 2 * small > len(squares) else max(1.0, float(np.median(squares)) / channels)
+
+
+@compiled("void(f8[::1], i8, f8[::1])")
+def _doubt(squares: Array, channels: int, tukey: Array) -> None:
+    """Fill in the weights of Tukey's biweight, square roots."""
+    per = 1.0 / (channels * TUKEY**2 * _scale(squares, channels))
+    for i in range(len(squares)):
+        tukey[i] = max(LEAST_WEIGHT, 1.0 - squares[i] * per)
+
+
+@compiled("f8(f8)")
+def on_lattice(at: float) -> float:
+    """Return the nearest place where balls are linearised, as far from the middle pixel as one may be."""
+    return max(-FARTHEST_PX, min(FARTHEST_PX, round(at * LATTICE) / LATTICE))
+
+
+@compiled(
+    "void(f8[:, ::1], f8[:, ::1], Array(float32, 3, 'C', True), f8[::1], Array(float32, 3, 'C', True), f8[::1],"
+    "f8[::1], f8, f8, f8[::1])"
+)
+def gauss_newton(
+    bright: Array, colour: Array, luma: NDArray[np.float32], luma_made: Array, chroma: NDArray[np.float32],
+    chroma_made: Array, ball: Array, u: float, v: float, fit: Array,
+) -> None:  # fmt: skip
+    """Fit from a start (u, v), pixels from the patch's middle; fill in u, v, covariance uu, uv, vv and misfit."""
+    p, n_bright, n_colour = luma.shape[2], bright.shape[1], colour.shape[1]
+    drawn_b, drawn_c = np.empty((rows_of(p), n_bright)), np.empty((rows_of(p), n_colour))
+    work_b, work_c = np.empty((p + PLANE + 4, n_bright)), np.empty((p + PLANE + 4, n_colour))
+    tukey_b, squares_b, normal = np.ones(n_bright), np.empty(n_bright), np.empty(5)
+    tukey_c, squares_c, normal_c = np.ones(n_colour), np.empty(n_colour), np.empty(5)
+    misfit = det = 0.0
+    drawn_u = drawn_v = np.inf  # where the ball is drawn: nowhere yet
+    for iteration in range(ITERATIONS):
+        at_u, at_v = on_lattice(u), on_lattice(v)
+        if at_u != drawn_u or at_v != drawn_v:
+            draw_at(bright, luma, luma_made, ball, LUMA_VAR, at_u, at_v, drawn_b)
+            draw_at(colour, chroma, chroma_made, ball, CHROMA_VAR, at_u, at_v, drawn_c)
+            drawn_u, drawn_v = at_u, at_v
+        _linearise(bright, drawn_b, tukey_b, work_b, squares_b, normal)
+        _linearise(colour, drawn_c, tukey_c, work_c, squares_c, normal_c)
+        misfit_b = _misfit(squares_b, tukey_b, 1, p, normal)
+        misfit_c = _misfit(squares_c, tukey_c, 2, p, normal_c)
+        misfit = (misfit_b * n_bright + misfit_c * 2 * n_colour) / (n_bright + 2 * n_colour)
+        normal += normal_c
+        det = normal[0] * normal[2] - normal[1] * normal[1]
+        new_u = at_u + min(1.0, max(-1.0, (normal[2] * normal[3] - normal[1] * normal[4]) / det))
+        new_v = at_v + min(1.0, max(-1.0, (normal[0] * normal[4] - normal[1] * normal[3]) / det))
+        moved = max(abs(new_u - u), abs(new_v - v))
+        u, v = new_u, new_v
+        if moved < CONVERGED_PX and iteration > 0:
+            break
+        if moved <= ROUGH_PX:  # weights before that would hold the wrong place fast
+            _doubt(squares_b, 1, tukey_b)
+            _doubt(squares_c, 2, tukey_c)
+    fit[0], fit[1] = u, v
+    fit[2], fit[3], fit[4] = normal[2] / det, -normal[1] / det, normal[0] / det
+    fit[5] = misfit
+
+
+@compiled("f8(f8[:, ::1], Array(float32, 3, 'C', True), f8[::1], f8[::1], i8, f8, f8, f8[:, ::1])")
+def slopes_at(
+    pixels: Array, fine: NDArray[np.float32], made: Array, ball: Array, variance: int, u: float, v: float, slopes: Array
+) -> float:
+    """Fill in the slopes (2, n) of the first channel, as fitted at a centre (u, v), by that centre [1/px].
+
+    Returns the slope by the blur's variance of half the sum of squares that the fit leaves in all channels [1/px^2]:
+    positive when a sharper ball would fit better.
+    """
+    n, p, channels = pixels.shape[1], fine.shape[2], len(pixels) - LUMA
+    m = p + PLANE
+    drawn, weighted, weight = np.empty((rows_of(p), n)), np.empty((m, n)), pixels[TRUST] ** 2
+    factor, coefficients, rest, bend = np.empty((m, m)), np.empty((channels, m)), np.empty(n), np.empty(n)
+    draw_at(pixels, fine, made, ball, variance, u, v, drawn)
+    fit_linear(pixels, drawn[:m], weight, weighted, factor, coefficients)
+    total = 0.0
+    for channel in range(channels):
+        c = coefficients[channel]
+        residual(drawn[:m], c, pixels[LUMA + channel], rest)
+        slope_of(pixels, drawn[m + 2 * p :], c, bend)
+        for i in range(n):
+            total -= weight[i] * rest[i] * bend[i]
+    slope_of(pixels, drawn[m : m + p], coefficients[0], slopes[0])
+    slope_of(pixels, drawn[m + p : m + 2 * p], coefficients[0], slopes[1])
+    return total
+
+
+@compiled("f8(f8[:, ::1], Array(float32, 3, 'C', True), f8[::1], f8[::1], i8, f8, f8)")
+def squares_at(
+    pixels: Array, fine: NDArray[np.float32], made: Array, ball: Array, variance: int, u: float, v: float
+) -> float:
+    """Return the sum of squares left in brightness or colour at a centre (u, v)."""
+    n, p, channels = pixels.shape[1], fine.shape[2], len(pixels) - LUMA
+    m = p + PLANE
+    drawn, weighted, weight = np.empty((rows_of(p), n)), np.empty((m, n)), pixels[TRUST] ** 2
+    factor, coefficients, rest = np.empty((m, m)), np.empty((channels, m)), np.empty(n)
+    draw_at(pixels, fine, made, ball, variance, u, v, drawn)
+    fit_linear(pixels, drawn[:m], weight, weighted, factor, coefficients)
+    total = 0.0
+    for channel in range(channels):
+        residual(drawn[:m], coefficients[channel], pixels[LUMA + channel], rest)
+        for i in range(n):
+            total += weight[i] * rest[i] * rest[i]
+    return total

@@ -1,0 +1,103 @@
+"""Reading a template off at the pixels of a patch, wherever the ball's centre is."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.image.template import STREAK_MAX_PX
+from tracker.maths.compiled import compiled
+from tracker.types import Array
+
+RADIUS, LUMA_VAR, CHROMA_VAR, STREAK_U, STREAK_V, BALL_SIZE = range(6)
+"""What compiled code knows of a ball: radius [px], variances of its blurs, see `template.variance_of` [px^2], and how
+far its image moves during the exposure [px]."""
+
+
+@compiled("i8[:, ::1](f8, f8, f8)")
+def _places_along(streak_u: float, streak_v: float, per_px: float) -> NDArray[np.int64]:
+    """Return where along a streak the ball is drawn (2, k): steps in u and v from its middle [1/per_px px]."""
+    length = math.sqrt(streak_u * streak_u + streak_v * streak_v)
+    shrink = min(1.0, STREAK_MAX_PX / length) if length > 0.0 else 0.0
+    count = math.ceil(2.0 * length * shrink) | 1
+    places = np.empty((2, count), np.int64)
+    for k in range(count):
+        along = ((k + 0.5) / count - 0.5) * shrink * per_px
+        places[0, k], places[1, k] = round(along * streak_u), round(along * streak_v)
+    return places
+
+
+@compiled("void(Array(float32, 3, 'C', True), i8, i8, f8, i8[:, ::1], f8[:, ::1], f4[:, :, ::1])")
+def _gather(
+    fine: NDArray[np.float32], u_steps: int, v_steps: int, per_px: float, places: NDArray[np.int64], pixels: Array,
+    sums: NDArray[np.float32],
+) -> None:  # fmt: skip
+    """Fill in (5, p, n) each shape at each pixel and at its four neighbours on the grid, summed over all places.
+
+    They come in the order here, left, right, above, below. The rim, where all beyond is read, is empty.
+    """
+    size, shapes = len(fine), fine.shape[2]
+    middle, flat, last = size // 2, fine.reshape(size * size * shapes), size - 2
+    along, below = np.uint64(shapes), np.uint64(size * shapes)  # unsigned, so that no index is looked at for its sign
+    starts = np.empty(places.shape[1], np.uint64)
+    for i in range(pixels.shape[1]):
+        column, row = middle - u_steps + int(pixels[0, i] * per_px), middle - v_steps + int(pixels[1, i] * per_px)
+        for k in range(len(starts)):
+            c, r = min(max(column - places[0, k], 1), last), min(max(row - places[1, k], 1), last)
+            starts[k] = np.uint64((r * size + c) * shapes)
+        for p in range(shapes):
+            here = left = right = above = under = np.float32(0.0)
+            for k in range(len(starts)):
+                at = starts[k] + np.uint64(p)
+                here += flat[at]
+                left += flat[at - along]
+                right += flat[at + along]
+                above += flat[at - below]
+                under += flat[at + below]
+            sums[0, p, i], sums[1, p, i], sums[2, p, i] = here, left, right
+            sums[3, p, i], sums[4, p, i] = above, under
+
+
+@compiled(
+    "void(Array(float32, 3, 'C', True), f8[::1], f8[::1], i8, f8, f8, f8[:, ::1],"
+    "f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])"
+)
+def read(
+    fine: NDArray[np.float32], made: Array, ball: Array, variance: int, u: float, v: float, pixels: Array,
+    value: Array, by_u: Array, by_v: Array, bend: Array,
+) -> None:  # fmt: skip
+    """Read a template off for a centre at (u, v) from a patch's middle, smeared along a streak.
+
+    Args:
+        fine, made: of the template.
+        ball (BALL_SIZE,): the ball, which the one drawn is near to.  variance: LUMA_VAR or CHROMA_VAR.
+        pixels (..., n): the patch, x and y in its first rows.
+        value, by_u, by_v (p, n): the shapes, and their slopes by the centre's u and v [1/px], to be filled in.
+        bend (p, n): half the Laplacian, which is their slope by the blur's variance [1/px^2], to be filled in.
+    What the ball is off from the one drawn, and its centre from the grid, is put right to the second order. A ball
+    larger by a share s / (1 - s) is the drawn one blown up: I(x) = J(x - d) with d = s x, and in one direction
+    J(x - d) = J - d J' + d^2 J'' / 2, where r^2 J'' = r^2 lap J - r J' for a round picture. Blown up, its blur is too;
+    what it then lacks of the variance acts by the heat equation, dI / d variance = lap I / 2.
+    """
+    per_px, share = made[0], (ball[RADIUS] - made[1]) / ball[RADIUS]
+    lacking = ball[variance] - made[2] * (ball[RADIUS] / made[1]) ** 2
+    places = _places_along(ball[STREAK_U], ball[STREAK_V], per_px)
+    u_steps, v_steps = round(u * per_px), round(v * per_px)
+    off_u, off_v = u - u_steps / per_px, v - v_steps / per_px
+    lacking += 0.5 * (off_u * off_u + off_v * off_v)  # of a step's second order what has no direction
+    n, mean = pixels.shape[1], 1.0 / places.shape[1]
+    sums = np.empty((5, len(value), n), np.float32)
+    _gather(fine, u_steps, v_steps, per_px, places, pixels, sums)
+    slope, curve = 0.5 * mean * per_px, 0.5 * mean * per_px * per_px
+    first, second = share + 0.5 * share * share, share * share
+    for p in range(len(value)):
+        for i in range(n):
+            x, y = pixels[0, i] - u, pixels[1, i] - v
+            du, dv = slope * (sums[1, p, i] - sums[2, p, i]), slope * (sums[3, p, i] - sums[4, p, i])
+            around = sums[1, p, i] + sums[2, p, i] + sums[3, p, i] + sums[4, p, i]
+            half = curve * (around - np.float32(4.0) * sums[0, p, i])
+            by_u[p, i], by_v[p, i], bend[p, i] = du, dv, half
+            moved = (first * x + off_u) * du + (first * y + off_v) * dv
+            value[p, i] = mean * sums[0, p, i] + moved + (second * (x * x + y * y) + lacking) * half

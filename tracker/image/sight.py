@@ -1,0 +1,136 @@
+"""One ball in one image: find its colour near where it is expected, and fit its centre. The tracker's inner loop."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.image.centre import MAX_SHIFT_PX
+from tracker.image.colour_table import ColourTable
+from tracker.image.newton import gauss_newton
+from tracker.image.patch import Response, cut_pixels, light_of, trust_of
+from tracker.image.reading import BALL_SIZE, CHROMA_VAR, LUMA_VAR, STREAK_U, STREAK_V
+from tracker.image.reading import RADIUS as BALL_RADIUS
+from tracker.image.spots import find_spots
+from tracker.image.template import MARGIN_PX, STREAK_MAX_PX, Template, variance_of
+from tracker.image.view import RADIUS, S_UU, S_UV, S_VV, SPEED_U, SPEED_V, U, V
+from tracker.maths.compiled import compiled
+from tracker.types import Array, Image, Reason
+
+REGION_SIGMA = 3.5
+REGION_MARGIN_PX = 3.0
+LEAST_AREA_SHARE, MOST_AREA_SHARE = 0.15, 4.0  # of the ball's expected disc
+UV, COV, MISFIT, SPOT, SIZE = slice(0, 2), slice(2, 6), 6, slice(7, 9), 9
+"""What a fit gives: the centre [px], its covariance (uu, uv, vu, vv) [px^2], chi2 per degree of freedom, and the
+coloured spot's middle [px]."""
+_MISFIT, _SPOT_U, _SPOT_V = 6, 7, 8
+_FOUND, _NO_COLOUR, _OUT_OF_VIEW, _CUT_OFF, _RAN_AWAY = range(5)
+_REASONS = {
+    _NO_COLOUR: Reason.NO_BALL, _OUT_OF_VIEW: Reason.AT_BORDER, _CUT_OFF: Reason.AT_BORDER, _RAN_AWAY: Reason.NO_BALL,
+}  # fmt: skip
+
+Known = tuple[Array, int, Array, Array]
+"""Of a camera: variances of its blurs [px^2] and exposure [s], side of its blocks, light and trust of grey levels."""
+
+
+def known_of(response: Response) -> Known:
+    """Return how a camera answers to light, as compiled code takes it."""
+    block = response.block_px
+    variances = variance_of(response.luma_px, 1), variance_of(response.chroma_px, block)
+    return np.array((*variances, response.exposure_s)), block, light_of(response.gamma), trust_of(response.gamma)
+
+
+def find_ball(
+    image: Image, colour: ColourTable, view: Array, known: Known, drawn: tuple[Template, Template], fit: Array
+) -> Reason | None:
+    """Find a ball near a prediction and fit its centre.
+
+    Args:
+        image: (height, width, 3) BGR.
+        colour: of this ball alone.
+        view: a row of `view.expected_views`, finite.
+        known: of the camera.
+        drawn: the templates of its brightness and of its colour.
+        fit (SIZE,): filled in.
+    Returns:
+        None; NO_BALL when nothing of its colour and size is there or the fit runs away, AT_BORDER when it is cut off.
+    """
+    luma, chroma = drawn
+    status = _find_and_fit(
+        image, colour.least_spread, colour.lowest_spread, colour.hues, colour.blue, colour.red, view, *known, luma.fine,
+        luma.made, chroma.fine, chroma.made, fit,
+    )  # fmt: skip
+    return None if status == _FOUND else _REASONS[status]
+
+
+@compiled("f8[::1](f8[::1], f8[::1])")
+def _ball_of(view: Array, answers: Array) -> Array:
+    """Return what is known of a ball, see `reading.BALL_SIZE`."""
+    ball = np.empty(BALL_SIZE)
+    ball[BALL_RADIUS], ball[LUMA_VAR], ball[CHROMA_VAR] = view[RADIUS], answers[0], answers[1]
+    ball[STREAK_U], ball[STREAK_V] = view[SPEED_U] * answers[2], view[SPEED_V] * answers[2]
+    return ball
+
+
+@compiled(
+    "UniTuple(f8, 2)(Array(u1, 3, 'C', True), Array(i2, 2, 'C', True), Array(i2, 1, 'C', True),"
+    "Array(b1, 2, 'C', True), i8, i8, f8[::1])"
+)
+def _nearest_spot(
+    image: Image, least_spread: NDArray[np.int16], lowest_spread: NDArray[np.int16], hues: NDArray[np.bool_],
+    blue: int, red: int, view: Array,
+) -> tuple[float, float]:  # fmt: skip
+    """Return the middle of the spot nearest the prediction; NaN when there is none, infinity out of view."""
+    height, width, u, v, radius_px = image.shape[0], image.shape[1], view[U], view[V], view[RADIUS]
+    half_u = REGION_SIGMA * np.sqrt(view[S_UU]) + radius_px + REGION_MARGIN_PX
+    half_v = REGION_SIGMA * np.sqrt(view[S_VV]) + radius_px + REGION_MARGIN_PX
+    left, top = max(0, math.floor(u - half_u)), max(0, math.floor(v - half_v))
+    right, bottom = min(width, math.ceil(u + half_u) + 1), min(height, math.ceil(v + half_v) + 1)
+    if not (left < right and top < bottom):
+        return np.inf, np.inf
+    area = math.pi * radius_px**2
+    most_px = MOST_AREA_SHARE * area
+    spots = find_spots(image, left, top, right, bottom, least_spread, lowest_spread, hues, blue, red, most_px)
+    nearest_u, nearest_v, least = np.nan, np.nan, np.inf
+    for k in range(len(spots)):
+        du, dv = spots[k, 1] - u, spots[k, 2] - v
+        distance2 = view[S_VV] * du * du - 2.0 * view[S_UV] * du * dv + view[S_UU] * dv * dv
+        if spots[k, 3] >= LEAST_AREA_SHARE * area and distance2 < least:
+            nearest_u, nearest_v, least = spots[k, 1], spots[k, 2], distance2
+    return nearest_u, nearest_v
+
+
+@compiled(
+    "i8(Array(u1, 3, 'C', True), Array(i2, 2, 'C', True), Array(i2, 1, 'C', True), Array(b1, 2, 'C', True), i8, i8,"
+    "f8[::1], f8[::1], i8, f8[::1], f8[::1], Array(f4, 3, 'C', True), f8[::1], Array(f4, 3, 'C', True), f8[::1],"
+    "f8[::1])"
+)
+def _find_and_fit(
+    image: Image, least_spread: NDArray[np.int16], lowest_spread: NDArray[np.int16], hues: NDArray[np.bool_],
+    blue: int, red: int, view: Array, answers: Array, block: int, light: Array, trust: Array,
+    luma: NDArray[np.float32], luma_made: Array, chroma: NDArray[np.float32], chroma_made: Array, fit: Array,
+) -> int:  # fmt: skip
+    """Find the spot nearest the prediction, cut its pixels out and fit them; fill in fit (SIZE,), say how it went."""
+    height, width = image.shape[0], image.shape[1]
+    spot_u, spot_v = _nearest_spot(image, least_spread, lowest_spread, hues, blue, red, view)
+    if np.isnan(spot_u):
+        return _NO_COLOUR
+    if np.isinf(spot_u):
+        return _OUT_OF_VIEW
+    ball, found = _ball_of(view, answers), np.empty(6)
+    streak_px = math.sqrt(ball[STREAK_U] ** 2 + ball[STREAK_V] ** 2)
+    edge_px = ball[BALL_RADIUS] + min(streak_px, STREAK_MAX_PX) / 2.0  # as `patch.edge_of`
+    half, middle_u, middle_v = math.ceil(edge_px + MARGIN_PX), round(spot_u), round(spot_v)
+    if not (half <= middle_u < width - half and half <= middle_v < height - half):
+        return _CUT_OFF
+    du, dv = spot_u - middle_u, spot_v - middle_v
+    bright, colour = cut_pixels(image, middle_u, middle_v, half, block, du, dv, edge_px, light, trust)
+    gauss_newton(bright, colour, luma, luma_made, chroma, chroma_made, ball, du, dv, found)
+    if not (found[0] - du) ** 2 + (found[1] - dv) ** 2 <= MAX_SHIFT_PX**2:
+        return _RAN_AWAY
+    fit[0], fit[1] = found[0] + middle_u, found[1] + middle_v
+    fit[2], fit[3], fit[4], fit[5] = found[2], found[3], found[3], found[4]
+    fit[_MISFIT], fit[_SPOT_U], fit[_SPOT_V] = found[5], spot_u, spot_v
+    return _FOUND

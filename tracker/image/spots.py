@@ -1,0 +1,266 @@
+"""Connected spots of the balls' colours in a rectangle of pixels, found row by row in one pass."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.image.colour_table import FIXED_POINT, HUE_STEPS, LEVELS
+from tracker.image.tint import UNITY
+from tracker.maths.compiled import compiled
+from tracker.types import Array, Image
+
+MIN_AREA_PX = 4
+FILL_MIN = 0.4  # share of its bounding box that a spot of a disc covers (pi/4 when whole)
+ASPECT_MAX = 2.2
+
+_HUE_SCALE = np.array([0, *(round((HUE_STEPS << FIXED_POINT) / (6.0 * k)) for k in range(1, LEVELS))])
+_HALF = 1 << FIXED_POINT - 1
+
+# The table of spots while they grow, by column; a spot that met another one leads to it by its PARENT.
+_PARENT, _BALL, _AREA, _SUM_U, _SUM_V, _LEFT, _TOP, _RIGHT, _BOTTOM, _COLUMNS = range(10)
+_FIRST_CAPACITY = 64
+WIDE_PX = 64  # rows as long as that are worth a first look at many pixels at once
+
+
+@compiled("i8(i8, i8, i8, i8, i8)")
+def _hue(blue: int, green: int, red: int, value: int, spread: int) -> int:
+    """Return OpenCV's 8-bit hue, 0..179, of a pixel whose largest channel is `value`, its least `spread` below."""
+    if value == red:
+        turn = green - blue
+    elif value == green:
+        turn = blue - red + 2 * spread
+    else:
+        turn = red - green + 4 * spread
+    hue: int = (turn * _HUE_SCALE[spread] + _HALF) >> FIXED_POINT
+    return hue if hue >= 0 else hue + HUE_STEPS
+
+
+@compiled("i8(i8[:, ::1], i8)")
+def _root(spots: NDArray[np.int64], spot: int) -> int:
+    """Return the spot that this one has become part of, shortening the way for the next time."""
+    while spots[spot, _PARENT] != spot:
+        spots[spot, _PARENT] = spots[spots[spot, _PARENT], _PARENT]
+        spot = spots[spot, _PARENT]
+    return spot
+
+
+@compiled("i8(i8[:, ::1], i8, i8)")
+def _join(spots: NDArray[np.int64], a: int, b: int) -> int:
+    """Make two spots one and return it."""
+    a, b = _root(spots, a), _root(spots, b)
+    if a == b:
+        return a
+    a, b = min(a, b), max(a, b)
+    spots[b, _PARENT] = a
+    for column in (_AREA, _SUM_U, _SUM_V):
+        spots[a, column] += spots[b, column]
+    for column in (_LEFT, _TOP):
+        spots[a, column] = min(spots[a, column], spots[b, column])
+    for column in (_RIGHT, _BOTTOM):
+        spots[a, column] = max(spots[a, column], spots[b, column])
+    return a
+
+
+@compiled("void(i8[:, ::1], i8, i8, i8, i8, i8)")
+def _start(spots: NDArray[np.int64], spot: int, ball: int, first: int, last: int, row: int) -> None:
+    """Start a spot with one run of pixels."""
+    length = last - first + 1
+    spots[spot, _PARENT], spots[spot, _BALL], spots[spot, _AREA] = spot, ball, length
+    spots[spot, _SUM_U], spots[spot, _SUM_V] = (first + last) * length // 2, row * length
+    spots[spot, _LEFT], spots[spot, _RIGHT], spots[spot, _TOP], spots[spot, _BOTTOM] = first, last, row, row
+
+
+@compiled("f8[:, ::1](i8[:, ::1], i8, f8)")
+def _likely(spots: NDArray[np.int64], count: int, most_px: float) -> Array:
+    """Return ball, u, v, area of the whole spots that may be a disc, largest first."""
+    likely = np.empty((count, 4))
+    kept = 0
+    for k in range(count):
+        area = spots[k, _AREA]
+        width, height = spots[k, _RIGHT] - spots[k, _LEFT] + 1, spots[k, _BOTTOM] - spots[k, _TOP] + 1
+        if spots[k, _PARENT] != k or area < MIN_AREA_PX or area > most_px:
+            continue
+        if area < FILL_MIN * width * height or max(width, height) > ASPECT_MAX * min(width, height) + 1:
+            continue
+        place = kept
+        while place > 0 and likely[place - 1, 3] < area:
+            likely[place] = likely[place - 1]
+            place -= 1
+        likely[place, 0], likely[place, 3] = spots[k, _BALL], area
+        likely[place, 1], likely[place, 2] = spots[k, _SUM_U] / area, spots[k, _SUM_V] / area
+        kept += 1
+    return likely[:kept].copy()
+
+
+@compiled("i8(Array(i2, 1, 'C', readonly=True))")
+def _shift_for(lowest_spread: NDArray[np.int16]) -> int:
+    """Return how far a value may be shifted so that what is left is less than any spread of a colour: 2, or 0."""
+    for value in range(LEVELS):
+        if value >> 2 >= lowest_spread[value]:
+            return 0
+    return 2
+
+
+@compiled("void(Array(u1, 3, 'C', readonly=True), i8, i8, i8, i8, u1[:, ::1])")
+def _line(image: Image, row: int, left: int, blue_by: int, red_by: int, line: NDArray[np.uint8]) -> None:
+    """Fill in the pixels of a row from `left` on, the colour of the light undone."""
+    line[:] = image[row, left : left + len(line)]
+    if blue_by == UNITY and red_by == UNITY:
+        return
+    blue, red, most = np.uint16(blue_by), np.uint16(red_by), np.uint16(LEVELS - 1)
+    for i in range(len(line)):
+        line[i, 0] = min(most, np.uint16(np.uint16(line[i, 0]) * blue // np.uint16(UNITY)))
+        line[i, 2] = min(most, np.uint16(np.uint16(line[i, 2]) * red // np.uint16(UNITY)))
+
+
+@compiled("void(u1[:, ::1], i8, u1[::1])")
+def _flag(pixels: NDArray[np.uint8], shift: int, flags: NDArray[np.uint8]) -> None:
+    """Flag the pixels of a row that may have a colour.
+
+    The shift is a constant where it can be: then the processor takes many pixels at once.
+    """
+    if shift == 2:
+        line, three = pixels.reshape(3 * len(pixels)), np.uint64(3)
+        for i in range(np.uint64(len(pixels))):  # unsigned all through: a sign or a wider number would stop that
+            at = three * np.uint64(i)
+            blue, green, red = line[at], line[at + np.uint64(1)], line[at + np.uint64(2)]
+            most = blue if blue > green else green
+            most = red if red > most else most
+            least = blue if blue < green else green
+            least = red if red < least else least
+            flags[i] = np.uint8(most - least) > np.uint8(most >> np.uint8(2))
+    else:
+        flags[: len(pixels)] = np.uint8(1)
+
+
+@compiled("i8(u1[:, ::1], i8, Array(i2, 1, 'C', readonly=True), i8, u1[::1], i8[:, ::1])")
+def _coloured(
+    line: NDArray[np.uint8], left: int, lowest_spread: NDArray[np.int16], shift: int,
+    flags: NDArray[np.uint8], pixels: NDArray[np.int64],
+) -> int:  # fmt: skip
+    """Write column, value, spread and hue of a row's pixels that may have a colour, and return how many they are.
+
+    line: the row's pixels (n, 3) from column `left` on.
+    flags: overwritten; a multiple of 8 of them, those beyond the row 0.
+    """
+    _flag(line, shift, flags)
+    found, eights = 0, flags.view(np.uint64)
+    for eight in range(len(eights)):
+        if eights[eight] == 0:
+            continue
+        for i in range(8 * eight, min(len(line), 8 * eight + 8)):
+            blue, green, red = line[i, 0], line[i, 1], line[i, 2]
+            value = max(blue, green, red)
+            spread = value - min(blue, green, red)
+            if spread >= lowest_spread[value]:
+                pixels[found, 0], pixels[found, 1], pixels[found, 2] = left + i, value, spread
+                pixels[found, 3] = _hue(blue, green, red, value, spread)
+                found += 1
+    return found
+
+
+@compiled("i8(i8[:, ::1], i8, Array(i2, 1, 'C', readonly=True), Array(b1, 1, 'C', readonly=True), i8[:, ::1])")
+def _runs(
+    pixels: NDArray[np.int64], found: int, least: NDArray[np.int16], hues: NDArray[np.bool_], runs: NDArray[np.int64]
+) -> int:
+    """Write first and last column of each run of pixels of one colour, and return how many they are."""
+    count = 0
+    for k in range(found):
+        if not hues[pixels[k, 3]] or pixels[k, 2] < least[pixels[k, 1]]:
+            continue
+        column = pixels[k, 0]
+        if count and runs[count - 1, 1] == column - 1:
+            runs[count - 1, 1] = column
+        else:
+            runs[count, 0] = runs[count, 1] = column
+            count += 1
+    return count
+
+
+@compiled("i8(i8[:, ::1], i8, i8, i8, i8[:, ::1], i8, i8[:, ::1], i8)")
+def _link(
+    spots: NDArray[np.int64],
+    count: int,
+    ball: int,
+    row: int,
+    above: NDArray[np.int64],
+    above_count: int,
+    runs: NDArray[np.int64],
+    run_count: int,
+) -> int:
+    """Make each run of a row part of the spots that it touches in the row above, or a new one; return their number."""
+    start = 0
+    for k in range(run_count):
+        first, last = runs[k, 0], runs[k, 1]
+        _start(spots, count, ball, first, last, row)
+        spot = count
+        while start < above_count and above[start, 1] < first - 1:
+            start += 1
+        other = start
+        while other < above_count and above[other, 0] <= last + 1:
+            spot = _join(spots, spot, above[other, 2])
+            other += 1
+        runs[k, 2] = spot
+        count += 1
+    return count
+
+
+@compiled("i8[:, ::1](i8[:, ::1], i8)")
+def _with_room(spots: NDArray[np.int64], needed: int) -> NDArray[np.int64]:
+    """Return the table, or a larger copy when it does not hold so many spots."""
+    if needed <= len(spots):
+        return spots
+    larger = np.empty((2 * needed, _COLUMNS), np.int64)
+    larger[: len(spots)] = spots
+    return larger
+
+
+@compiled(
+    "f8[:, ::1](Array(u1, 3, 'C', readonly=True), i8, i8, i8, i8, Array(i2, 2, 'C', readonly=True),"
+    "Array(i2, 1, 'C', readonly=True), Array(b1, 2, 'C', readonly=True), i8, i8, f8)"
+)
+def find_spots(
+    image: Image,
+    left: int,
+    top: int,
+    right: int,
+    bottom: int,
+    least_spread: NDArray[np.int16],
+    lowest_spread: NDArray[np.int16],
+    hues: NDArray[np.bool_],
+    blue: int,
+    red: int,
+    most_px: float,
+) -> Array:
+    """Find the spots of each of n colours; pixels that touch by a side or a corner belong together.
+
+    Args:
+        image: (height, width, 3) BGR.
+        left, top, right, bottom: where to look, within the image; right and bottom exclusive.
+        least_spread, lowest_spread, hues, blue, red: the colours, as in `tracker.image.colour_table.ColourTable`.
+        most_px: larger spots are none [px^2].
+    Returns:
+        (m, 4): index of the colour, centroid u and v in the whole image [px], area [px^2]; largest first.
+    Source: run-based labelling with union-find (He, Chao, Suzuki, 2008), all colours in one pass.
+    """
+    colours = len(hues)
+    spots, count = np.empty((_FIRST_CAPACITY, _COLUMNS), np.int64), 0
+    pixels = np.empty((right - left, 4), np.int64)
+    runs = np.empty((2, colours, (right - left) // 2 + 1, 3), np.int64)  # of the row above and of this one
+    lengths = np.zeros((2, colours), np.int64)
+    shift = _shift_for(lowest_spread) if right - left >= WIDE_PX else 0
+    line, flags = np.empty((right - left, 3), np.uint8), np.zeros((right - left + 7) // 8 * 8, np.uint8)
+    for row in range(top, bottom):
+        above, here = (row - 1) & 1, row & 1
+        _line(image, row, left, blue, red, line)
+        found = _coloured(line, left, lowest_spread, shift, flags, pixels)
+        for ball in range(colours):
+            length = _runs(pixels, found, least_spread[ball], hues[ball], runs[here, ball])
+            lengths[here, ball] = length
+            if length:
+                spots = _with_room(spots, count + length)
+                count = _link(
+                    spots, count, ball, row, runs[above, ball], lengths[above, ball], runs[here, ball], length
+                )
+    return _likely(spots, count, most_px)

@@ -1,0 +1,110 @@
+"""What a camera is expected to see of each ball, for who looks for it: one compiled call a camera."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+
+import numpy as np
+
+from tracker.filter.measure import camera_table, marker_points, pixels
+from tracker.maths.compiled import compiled
+from tracker.rig import Rig
+from tracker.state import State
+from tracker.types import Array
+
+U, V, S_UU, S_UV, S_VV, RADIUS, SPEED_U, SPEED_V, RAY_X, RAY_Y, DEPTH, _COLUMNS = range(12)
+
+
+@lru_cache(maxsize=16)
+def _radii(rig: Rig) -> Array:
+    """Return the balls' radii (n,) [m]."""
+    return np.array([ball.radius_m for ball in rig.marker.balls])
+
+
+def expected_views(state: State, rig: Rig, camera: int, t_ns: int) -> Array:
+    """Return what a camera is expected to see, a row each ball, for a frame that the camera stamped t_ns.
+
+    Args:
+        state: may be of another time than t_ns; its velocities and accelerations bridge the difference.
+    Returns:
+        (n, 11): centre U, V [px], NaN behind the camera; its covariance S_UU, S_UV, S_VV, a pixel of doubt about the
+        prediction included [px^2]; RADIUS [px]; how fast its image moves, SPEED_U, SPEED_V [px/s]; the ray to it
+        (RAY_X, RAY_Y, 1) in C; and its DEPTH before the camera [m], these by the state's own time.
+    """
+    lag_s = (t_ns - state.t_ns) * 1e-9
+    table, points, focal_px = camera_table(rig), marker_points(rig), rig.cameras[camera].focal_px
+    return _views(state.mean, state.manoeuvre_s, state.P, camera, lag_s, table, points, _radii(rig), focal_px)
+
+
+@compiled("void(f8[::1], f8[::1], f8[::1], f8[::1])")
+def _place(mean: Array, m_inB: Array, camera: Array, view: Array) -> None:
+    """Fill in the ray to a ball and its depth."""
+    X = Y = Z = 0.0
+    for i in range(3):
+        d = mean[i] - camera[21 + i]
+        for j in range(3):
+            d += mean[3 + 3 * i + j] * m_inB[j]
+        X, Y, Z = X + camera[12 + 3 * i] * d, Y + camera[13 + 3 * i] * d, Z + camera[14 + 3 * i] * d
+    view[RAY_X], view[RAY_Y], view[DEPTH] = X / Z, Y / Z, Z
+
+
+@compiled("f8[:, ::1](f8[::1], f8, f8[:, ::1], i8, f8, f8[:, ::1], f8[:, ::1], f8[::1], f8)")
+def _views(
+    mean: Array, T: float, P: Array, camera: int, lag_s: float, table: Array, points_inB: Array, radii_m: Array,
+    focal_px: float,
+) -> Array:  # fmt: skip
+    """Fill in the rows of `expected_views`."""
+    n = len(points_inB)
+    views = np.empty((n, _COLUMNS))
+    h, H = pixels(mean, T, np.full(n, camera), np.arange(n), np.full(n, lag_s), table, points_inB)
+    for b in range(n):
+        view, H_u, H_v = views[b], H[2 * b], H[2 * b + 1]
+        view[U], view[V] = h[2 * b], h[2 * b + 1]
+        view[S_UU], view[S_UV], view[S_VV] = 1.0, 0.0, 1.0
+        for i in range(len(P)):
+            PH_u, PH_v = 0.0, 0.0
+            for j in range(len(P)):
+                PH_u += P[i, j] * H_u[j]
+                PH_v += P[i, j] * H_v[j]
+            view[S_UU] += H_u[i] * PH_u
+            view[S_UV] += H_u[i] * PH_v
+            view[S_VV] += H_v[i] * PH_v
+        view[SPEED_U], view[SPEED_V] = 0.0, 0.0
+        for i in range(6):  # the pose goes with velocity and rate, which stand after the attitude
+            view[SPEED_U] += H_u[i] * mean[12 + i]
+            view[SPEED_V] += H_v[i] * mean[12 + i]
+        _place(mean, points_inB[b], table[camera], view)
+        view[RADIUS] = focal_px * radii_m[b] / view[DEPTH] if view[DEPTH] > 0.0 else math.inf
+    return views
+
+
+@compiled("f8(UniTuple(f8, 3), f8[:, ::1], f8[:, ::1], f8[::1], f8)")
+def _smear(p_BinW: tuple[float, float, float], P: Array, table: Array, seconds_by_px: Array, reach_m: float) -> float:
+    """Return the largest of the cameras' streaks, see `unknown_streak_px`."""
+    variance, streak_px = 0.0, 0.0
+    for i in range(3):
+        variance += (P[6 + i, 6 + i] + reach_m * reach_m * P[9 + i, 9 + i]) / 3.0
+    for c in range(len(table)):
+        distance2 = 0.0
+        for i in range(3):
+            distance2 += (p_BinW[i] - table[c, 21 + i]) ** 2
+        streak_px = max(streak_px, math.sqrt(variance / distance2) * seconds_by_px[c])
+    return streak_px
+
+
+@lru_cache(maxsize=16)
+def _reach_m(rig: Rig) -> float:
+    """Return how far the farthest ball is from their middle [m]."""
+    points = rig.marker.points_inB
+    return float(np.linalg.norm(points - points.mean(axis=0), axis=1).max())
+
+
+def unknown_streak_px(state: State, rig: Rig, exposures_s: list[float]) -> float:
+    """Return one sigma of how far the balls' images may be smeared that a state does not know of [px].
+
+    exposures_s: of each camera.
+    """
+    scaled = [camera.focal_px * s for camera, s in zip(rig.cameras, exposures_s, strict=True)]
+    x, y, z = state.p_BinW.tolist()
+    return _smear((x, y, z), state.P, camera_table(rig), np.array(scaled), _reach_m(rig))

@@ -1,0 +1,1 @@
+"""Small mathematics of the tracker: rotations, small systems, limits."""
