@@ -15,10 +15,10 @@ from tools.calibrate.room.footage import Clip, Footage
 from tools.calibrate.room.scene import seen_at
 from tools.calibrate.room.start import triangulated
 from tools.calibrate.room.tracks import Track, track_of
-from tracker.centre import Centre, fit_centre
-from tracker.patch import Expected
+from tracker.image.centre import Centre, fit_centre
+from tracker.image.patch import Expected
+from tracker.image.rivals import Rivals, first_rivals
 from tracker.rig import Rig
-from tracker.rivals import Rivals, first_rivals
 from tracker.types import Array, Image
 
 LESSONS = 240  # images of each camera to learn from, spread over the footage

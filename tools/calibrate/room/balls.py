@@ -10,12 +10,12 @@ import cv2
 import numpy as np
 
 from tracker.camera import Camera
-from tracker.centre import Centre, fit_centre
-from tracker.detect import Blob
-from tracker.look import look_everywhere
-from tracker.patch import Expected, Response
+from tracker.image.centre import Centre, fit_centre
+from tracker.image.detect import Blob
+from tracker.image.look import look_everywhere
+from tracker.image.patch import Expected, Response
+from tracker.image.template import FLAT
 from tracker.rig import Rig
-from tracker.template import FLAT
 from tracker.types import Array, Frame
 
 MOST_CANDIDATES = 8  # of each ball, largest first: things in the room may be larger than a ball

@@ -91,7 +91,7 @@ def marker_poses(seen: Seen, cameras: tuple[Camera, ...], offsets_s: Array, rig:
 def triangulated(seen: Seen, cameras: tuple[Camera, ...], offsets_s: Array) -> Array:
     """Return the balls' places (m, balls, 3) [m], nearest the rays of all cameras that saw; NaN with fewer than two.
 
-    Source: `tracker.triangulate`, eq. 1.
+    Source: `tracker.start.triangulate`, eq. 1.
     """
     uv = seen.at(offsets_s)
     cameras_count, instants, balls, _ = uv.shape

@@ -19,8 +19,8 @@ from tools.calibrate.room.rigid import rigid
 from tools.calibrate.room.scene import Scene, Seen
 from tools.calibrate.room.solve import find_cameras
 from tools.calibrate.room.tracks import Track
-from tracker import so3
 from tracker.errors import OperatorError
+from tracker.maths import so3
 from tracker.rig import Rig, make_rig
 from tracker.scene import Look
 

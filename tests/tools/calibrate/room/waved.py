@@ -8,8 +8,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from tracker import so3
 from tracker.camera import Camera
+from tracker.maths import so3
 from tracker.rig import Rig
 from tracker.scene import Look
 from tracker.sources.paths import PathFunction, Pose, ScriptedPath
