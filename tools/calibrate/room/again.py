@@ -21,7 +21,9 @@ from tracker.image.rivals import Rivals, first_rivals
 from tracker.rig import Rig
 from tracker.types import Array, Image
 
-LESSONS = 240  # images of each camera to learn from, spread over the footage
+LESSONS, SWEEPS = 240, 6
+"""Images of each camera to learn from, and in how many sweeps over the footage: what was learned last counts most, and
+must not be where the marker happened to end."""
 
 
 def looked_again(footage: Footage, rig: Rig) -> tuple[Track, ...]:
@@ -62,7 +64,8 @@ def _measured(clips: Sequence[Clip], t_s: Array, views: Array, rig: Rig) -> Iter
     """Yield the stamps and centres of one camera's images that fit once it is known how it shows balls."""
     known = [k for k in np.flatnonzero(np.isfinite(views).all(axis=(1, 2))).tolist() if (views[k, :, 0] > 0.0).all()]
     rivals = first_rivals()
-    for k in known[:: max(1, len(known) // LESSONS)]:
+    lessons = known[:: max(1, len(known) // LESSONS)]
+    for k in (k for sweep in range(SWEEPS) for k in lessons[sweep::SWEEPS]):
         rivals = _taught(rivals, clips[k], views[k], rig)
     for k in known:
         image, balls = _image(clips[k], rig), range(len(rig.marker))

@@ -23,14 +23,17 @@ def camera_covariance(adjusted: Adjusted) -> Array:
     cameras as one is not in it: it is the frame's, not theirs.
 
     Source: to the covariance of the fit, systematic errors are added: each camera sees each ball aside by a constant,
-        and all see it aside on the marker, of as large a sigma as the residuals have, since of errors that do not vary
-        they tell nothing. Then the datum is changed from camera 0 to all of them: Baarda, "S-transformations and
-        criterion matrices" (1973).
+        and all balls by another, and all cameras see each aside on the marker, of as large a sigma as the residuals
+        have, since of errors that do not vary they tell nothing. Then the datum is changed from camera 0 to all of
+        them: Baarda, "S-transformations and criterion matrices" (1973).
     """
     cameras = adjusted.scene.cameras
     bias_px = max(LEAST_BIAS_PX, adjusted.rms_px)
     poses = CAMERA * (len(cameras) - 1)
-    shifts = np.hstack((adjusted.shifts, metres_a_pixel(adjusted.scene) * adjusted.by_marker))[:poses]
+    layout = adjusted.layout
+    together = adjusted.shifts.reshape(-1, layout.cameras, layout.balls, 2).sum(axis=2).reshape(-1, 2 * layout.cameras)
+    by_marker = metres_a_pixel(adjusted.scene) * adjusted.by_marker
+    shifts = np.hstack((adjusted.shifts, together, by_marker))[:poses]
     covariance = np.zeros((poses + CAMERA, poses + CAMERA))
     covariance[CAMERA:, CAMERA:] = adjusted.covariance[:poses, :poses] + bias_px**2 * shifts @ shifts.T
     D = _datum(cameras)

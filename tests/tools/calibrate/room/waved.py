@@ -1,4 +1,4 @@
-"""A marker waved through the room by hand, seen by simulated cameras whose clocks differ."""
+"""A marker waved through the room by hand and set down, seen by simulated cameras whose clocks differ."""
 
 from __future__ import annotations
 
@@ -8,38 +8,32 @@ from dataclasses import replace
 
 import numpy as np
 
+from tools.calibrate.room.footage import Footage, watch
 from tracker.camera import Camera
 from tracker.maths import so3
-from tracker.rig import Rig
+from tracker.rig import Rig, make_rig
 from tracker.scene import Look
-from tracker.sources.paths import PathFunction, Pose, ScriptedPath
+from tracker.sources.paths import ScriptedPath
 from tracker.sources.sim import START_NS, SimSource, SimTiming
+from tracker.sources.waving import waved_and_set_down
 from tracker.types import Array, Event, Frame, frozen_array
 
-AXES_inW = np.array([[1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [0.0, 0.0, math.sqrt(2.0)]]) / math.sqrt(2.0)
-REACH = np.array([0.55, 0.40, 0.35, 0.45, 0.45, math.pi])  # along AXES_inW [m], then roll, pitch, yaw [rad]
 
-
-def waved(seed: int) -> PathFunction:
-    """Return slow waves through most of what the paper's cameras see, with tilts that no flight has."""
-    rng = np.random.default_rng((seed, 0xCA1))
-    w = 2.0 * math.pi * np.array([0.13, 0.19, 0.23, 0.31, 0.29, 0.11]) * rng.uniform(0.8, 1.2, 6)
-    phase = rng.uniform(0.0, 2.0 * math.pi, 6)
-
-    def path(t_s: float) -> Pose:
-        now = REACH * np.sin(w * t_s + phase)
-        return now[:3] @ AXES_inW, so3.from_euler(*now[3:])
-
-    return path
-
-
-def footage_of(
-    rig: Rig, seed: int, look: Look, duration_s: float, late_ns: Sequence[int]
-) -> Iterator[Event]:  # fmt: skip
-    """Yield the frames. late_ns: how much later than its stamps each camera sees [ns]."""
-    timing = SimTiming(rate_hz=15.0, duration_s=duration_s)
-    for event in SimSource(rig, ScriptedPath("waved", waved(seed), START_NS), lambda: 0, timing, look, seed):
+def frames_of(rig: Rig, seed: int, look: Look, wave_s: float, late_ns: Sequence[int]) -> Iterator[Event]:
+    """Yield the frames of waves and of three spots after them, 9.6 s. late_ns: by how much later each camera sees [ns]."""
+    timing = SimTiming(rate_hz=15.0, duration_s=wave_s + 9.6)
+    path = ScriptedPath("waved", waved_and_set_down(seed, wave_s), START_NS)
+    for event in SimSource(rig, path, lambda: 0, timing, look, seed):
         yield replace(event, t_ns=event.t_ns - late_ns[event.camera]) if isinstance(event, Frame) else event
+
+
+def watched(
+    true: Rig, seed: int, look: Look, wave_s: float, late_ns: Sequence[int]
+) -> tuple[Rig, Footage]:  # fmt: skip
+    """Return a rig whose cameras are said to stand elsewhere, and the footage of the true one."""
+    rng = np.random.default_rng(seed)
+    said = make_rig(tuple(misplaced(camera, rng) for camera in true.cameras), true.marker)
+    return said, watch(frames_of(true, seed, look, wave_s, late_ns), said, 100.0)
 
 
 def misplaced(camera: Camera, rng: np.random.Generator) -> Camera:
