@@ -55,9 +55,9 @@ def with_room(text: str, room: Room, verdict: Verdict, record: Record) -> str:
         if old is None:
             tables.append(new)
             continue
-        old.pop("clock_offset_ms", None)
-        for key, value in new.items():
-            old[key] = value
+        old.update(new)
+        if "clock_offset_ms" in old:
+            old["clock_offset_ms"] = camera.clock_offset_ns / 1e6
         tables.append(old)
     measured = _measured(room, verdict, record)
     rig.pop("cameras", None)
@@ -65,7 +65,7 @@ def with_room(text: str, room: Room, verdict: Verdict, record: Record) -> str:
     rig.update(FROM_ELSEWHERE)
     rig.add("measured", measured)
     rig.add("cameras", tables)
-    return tomlkit.dumps(document)
+    return re.sub(r"\n{3,}", "\n\n", tomlkit.dumps(document))  # tables that were moved bring their blank lines along
 
 
 def _measured(room: Room, verdict: Verdict, record: Record) -> tomlkit.items.Table:

@@ -45,7 +45,7 @@ def _scene(rig: Rig, instants: int, rng: np.random.Generator) -> tuple[Scene, Se
 
 
 def _errors(found: Found, true: Rig) -> tuple[Array, Array]:
-    """Return each camera's error in place (n, 3) [m] and turn (n, 3) [rad], of which all cameras' own has been taken."""
+    """Return each camera's error in place (n, 3) [m] and turn (n, 3) [rad], all cameras' common one taken off."""
     pairs = list(zip(aligned(found.scene, true.cameras).cameras, true.cameras, strict=True))
     turns = np.array([so3.log(truth.R_CtoW.T @ camera.R_CtoW) for camera, truth in pairs])
     return np.array([camera.p_CinW - truth.p_CinW for camera, truth in pairs]), turns

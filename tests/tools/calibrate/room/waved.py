@@ -20,16 +20,14 @@ from tracker.types import Array, Event, Frame, frozen_array
 
 
 def frames_of(rig: Rig, seed: int, look: Look, wave_s: float, late_ns: Sequence[int]) -> Iterator[Event]:
-    """Yield the frames of waves and of three spots after them, 9.6 s. late_ns: by how much later each camera sees [ns]."""
+    """Yield the frames of waves and of three spots after them, 9.6 s. late_ns: how much later each camera sees [ns]."""
     timing = SimTiming(rate_hz=15.0, duration_s=wave_s + 9.6)
     path = ScriptedPath("waved", waved_and_set_down(seed, wave_s), START_NS)
     for event in SimSource(rig, path, lambda: 0, timing, look, seed):
         yield replace(event, t_ns=event.t_ns - late_ns[event.camera]) if isinstance(event, Frame) else event
 
 
-def watched(
-    true: Rig, seed: int, look: Look, wave_s: float, late_ns: Sequence[int]
-) -> tuple[Rig, Footage]:  # fmt: skip
+def watched(true: Rig, seed: int, look: Look, wave_s: float, late_ns: Sequence[int]) -> tuple[Rig, Footage]:
     """Return a rig whose cameras are said to stand elsewhere, and the footage of the true one."""
     rng = np.random.default_rng(seed)
     said = make_rig(tuple(misplaced(camera, rng) for camera in true.cameras), true.marker)
