@@ -12,8 +12,7 @@ import numpy as np
 
 from tools.calibrate.room.balls import sigma_px
 from tools.calibrate.room.footage import Clip, Footage
-from tools.calibrate.room.scene import seen_at
-from tools.calibrate.room.start import triangulated
+from tools.calibrate.room.start import triangulated_from
 from tools.calibrate.room.tracks import Track, track_of
 from tracker.image.centre import Centre, fit_centre
 from tracker.image.patch import Expected
@@ -24,6 +23,7 @@ from tracker.types import Array, Image
 LESSONS, SWEEPS = 240, 6
 """Images of each camera to learn from, and in how many sweeps over the footage: what was learned last counts most, and
 must not be where the marker happened to end."""
+DOUBT = 3.0  # times the sigma of the first look
 
 
 def looked_again(footage: Footage, rig: Rig) -> tuple[Track, ...]:
@@ -53,15 +53,14 @@ def _times_s(clips: Sequence[Clip], rig: Rig, start_ns: int) -> Array:
 
 def _views(tracks: Sequence[Track], t_s: Array, c: int, rig: Rig) -> Array:
     """Return each ball's depth [m] and speed u, v [px/s] in one camera at instants (m,): (m, balls, 3), NaN unknown."""
-    still = np.zeros(len(rig.cameras))
-    seen = seen_at(tracks, t_s, still)
-    places_inW = triangulated(seen, rig.cameras, still)
-    depths_m = rig.cameras[c].in_camera(places_inW.reshape(-1, 3))[:, 2].reshape(places_inW.shape[:2])
-    return np.concatenate((depths_m[..., None], seen.speed[c]), axis=2)
+    each = [track.roughly(t_s) for track in tracks]
+    uv_px = np.stack([uv.reshape(-1, 2) for uv, _ in each])
+    depths_m = rig.cameras[c].in_camera(triangulated_from(uv_px, rig.cameras))[:, 2]
+    return np.concatenate((depths_m.reshape(len(t_s), -1, 1), each[c][1]), axis=2)
 
 
 def _measured(clips: Sequence[Clip], t_s: Array, views: Array, rig: Rig) -> Iterator[tuple[float, Array]]:
-    """Yield the stamps and centres of one camera's images that fit once it is known how it shows balls."""
+    """Yield the stamps and centres of one camera's images, fitted once it is known how it shows balls."""
     known = [k for k in np.flatnonzero(np.isfinite(views).all(axis=(1, 2))).tolist() if (views[k, :, 0] > 0.0).all()]
     rivals = first_rivals()
     lessons = known[:: max(1, len(known) // LESSONS)]
@@ -69,10 +68,15 @@ def _measured(clips: Sequence[Clip], t_s: Array, views: Array, rig: Rig) -> Iter
         rivals = _taught(rivals, clips[k], views[k], rig)
     for k in known:
         image, balls = _image(clips[k], rig), range(len(rig.marker))
-        fits = [fit_centre(image, _expected(rivals, clips[k], views[k], ball, rig)) for ball in balls]
-        centres = [(*fit.uv_px, sigma_px(fit)) for fit in fits if isinstance(fit, Centre)]
-        if len(centres) == len(fits):
-            yield float(t_s[k]), np.array(centres)
+        yield float(t_s[k]), np.stack([_refitted(image, rivals, clips[k], views[k], ball, rig) for ball in balls])
+
+
+def _refitted(image: Image, rivals: Rivals, clip: Clip, views: Array, ball: int, rig: Rig) -> Array:
+    """Return a ball's centre and one sigma (3,) [px]; that of the first look, believed less, where none fits now."""
+    fit = fit_centre(image, _expected(rivals, clip, views, ball, rig))
+    if isinstance(fit, Centre):
+        return np.append(fit.uv_px, sigma_px(fit))
+    return np.asarray(clip.centres_px[ball] * (1.0, 1.0, DOUBT))
 
 
 def _taught(rivals: Rivals, clip: Clip, views: Array, rig: Rig) -> Rivals:

@@ -15,17 +15,21 @@ from tools.calibrate.room.start import epipolar, marker_way, normalised, sides, 
 from tracker.rig import Rig
 from tracker.types import Array
 
+WILD = 20.0  # times the median: no calibration errs so at single instants
+
 
 @dataclass(frozen=True, slots=True)
 class HeldOut:
     """What cameras make of a marker that they were not fitted to.
 
+    instants: at which two cameras or more saw every ball.  wild: share of them at which something was taken for a ball.
     spacing_mm, worst_spacing_mm: by how much distances of balls are wrong, median and 95 % of them.
     reprojection_px: rms on an axis, the balls' poses being fitted.  epipolar_px: rms distance of one camera's ball from
     the line on which another sees it.
     """
 
     instants: int
+    wild: float
     spacing_mm: float
     worst_spacing_mm: float
     reprojection_px: float
@@ -37,11 +41,15 @@ def judged(found: Found, rig: Rig) -> HeldOut:
     seen, offsets_s, cameras = found.held_out, found.scene.offsets_s, found.cameras
     seen = seen.only(seen.there.sum(axis=0) >= 2)
     if not len(seen.t_s):
-        return HeldOut(0, *[float("nan")] * 4)
+        return HeldOut(0, 0.0, *[float("nan")] * 4)
     off_mm = 1e3 * np.abs(sides(triangulated(seen, cameras, offsets_s)) - sides(rig.marker.points_inB))
+    farthest_mm = off_mm.max(axis=1)
+    tame = np.asarray(farthest_mm <= WILD * np.median(farthest_mm))
+    count, off_mm, seen = len(seen.t_s), off_mm[tame], seen.only(tame)
     scene, fitting = marker_way(seen, cameras, offsets_s, rig)
     return HeldOut(
-        len(seen.t_s),
+        count,
+        float(1.0 - tame.mean()),
         float(np.median(off_mm)),
         float(np.quantile(off_mm, 0.95)),
         rms(residuals(scene, fitting)),

@@ -10,6 +10,7 @@ from tools.calibrate.room.tracks import Track
 from tracker.errors import OperatorError
 from tracker.rig import Rig
 
+LEAST_S = 5.0
 LEAST_SWAY_PX = 15.0  # standard deviation of the marker's place in a picture
 CHECK = "check light and colours with `posebridge colours`"
 
@@ -28,6 +29,12 @@ def inspect(footage: Footage, rig: Rig, source: str) -> None:
         raise OperatorError(
             f"{source}: no marker in {sum(footage.frames)} pictures: all {len(rig.marker)} balls must be seen at once; "
             f"{CHECK}"
+        )
+    length_s = max(float(np.ptp(track.t_s)) for track in footage.tracks if len(track))
+    if length_s < LEAST_S:
+        raise OperatorError(
+            f"{source}: the marker was seen for {length_s:.1f} s, at least {LEAST_S:.0f} s are needed, a minute is "
+            "good: wave it longer"
         )
     for camera, count, frames, track in zip(rig.cameras, counts, footage.frames, footage.tracks, strict=True):
         if count < LEAST_SHARED:

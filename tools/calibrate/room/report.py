@@ -103,9 +103,9 @@ def _errors(room: Room) -> Iterator[str]:
 
 def _held_out(held_out: HeldOut) -> str:
     return (
-        f"held out: {held_out.instants} instants, balls' distances {held_out.spacing_mm:.2f} mm off (95 %: "
-        f"{held_out.worst_spacing_mm:.2f} mm), reprojection {held_out.reprojection_px:.3f} px, epipolar "
-        f"{held_out.epipolar_px:.3f} px"
+        f"held out: {held_out.instants} instants ({100 * held_out.wild:.0f} % mistaken), balls' distances "
+        f"{held_out.spacing_mm:.2f} mm off (95 %: {held_out.worst_spacing_mm:.2f} mm), reprojection "
+        f"{held_out.reprojection_px:.3f} px, epipolar {held_out.epipolar_px:.3f} px"
     )
 
 

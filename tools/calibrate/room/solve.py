@@ -18,7 +18,7 @@ from tools.calibrate.room.footage import Footage
 from tools.calibrate.room.gauge import aligned
 from tools.calibrate.room.jacobian import Layout
 from tools.calibrate.room.scene import Scene, Seen, common_instants, seen_at
-from tools.calibrate.room.start import first_scene, marker_way
+from tools.calibrate.room.start import check_shared, first_scene, marker_way
 from tools.calibrate.room.tracks import Track
 from tracker.camera import Camera
 from tracker.rig import Rig, make_rig
@@ -76,10 +76,13 @@ def refined(tracks: Sequence[Track], t_s: Array, guess: Scene, rig: Rig, *, lens
         guess: cameras and clocks that are about right; its marker's poses do not matter.
         rig: the marker, the frame of the result, and the clock offsets that are in the tracks.
         lenses: adjust focal lengths and centres too.
+    Raises:
+        OperatorError: a camera whose sightings do not make the marker together with another's.
     """
     kept, cameras, offsets_s = t_s[~is_held_out(t_s)], guess.cameras, guess.offsets_s
     for _ in range(ROUNDS):
         scene, seen = marker_way(seen_at(tracks, kept, offsets_s), cameras, offsets_s, rig)
+        check_shared(seen, rig)
         result = adjust(scene, seen, Layout(len(cameras), len(rig.marker), len(seen.t_s), lenses))
         cameras, offsets_s = result.scene.cameras, result.scene.offsets_s
     scene = aligned(result.scene, rig.cameras)

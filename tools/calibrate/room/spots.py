@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tools.calibrate.room.scene import seen_at
 from tools.calibrate.room.solve import Found
-from tools.calibrate.room.start import marker_poses
+from tools.calibrate.room.start import poses_of, triangulated_from
+from tools.calibrate.room.tracks import Track
+from tracker.camera import Camera
 from tracker.errors import OperatorError
 from tracker.rig import Rig
 from tracker.types import Array
 
-STILL_M, LEAST_STILL_S, GAP_S = 0.002, 1.5, 0.5  # a hand sways further
+STILL_PX, LEAST_STILL_S = 0.7, 1.5  # a hand sways further
+MOST, NEARLY, LEAST_FRAMES = 0.7, 0.8, 5  # of the frames, of the time, and how many
 ANOTHER_M = 0.1  # nearer stands are one and the same
 LEAST_ACROSS_M = 0.15  # of the third spot from the line through the first two
 LEAST_ALONG_M = 0.25
@@ -22,6 +24,10 @@ LEVEL_DEG = 20.0
 HOW = (
     "let the vehicle stand still for 3 s on each of three places of a level floor or table, 0.5 m apart, the last aside"
 )
+
+
+Span = tuple[float, float]
+"""From when to when [s]."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,20 +66,13 @@ class Floor:
 
 
 def find_stands(found: Found, rig: Rig) -> list[Stand]:
-    """Find where the vehicle stood still, in order of time; two stands at one place are one."""
-    spans = [(track.t_s[0], track.t_s[-1], float(np.median(np.diff(track.t_s)))) for track in found.tracks]
-    t_s = np.arange(min(a for a, _, _ in spans), max(b for _, b, _ in spans), min(p for _, _, p in spans))
-    seen = seen_at(found.tracks, t_s, found.scene.offsets_s)
-    p_BinW, R_BtoW = marker_poses(seen, found.cameras, found.scene.offsets_s, rig)
-    known = np.isfinite(p_BinW).all(axis=1)
+    """Find where the vehicle stood still before two cameras or more, in order of time; two at one place are one."""
+    tracks = [_shifted(t, offset_s) for t, offset_s in zip(found.tracks, found.scene.offsets_s.tolist(), strict=True)]
     stands: list[Stand] = []
-    for first, last in _still(t_s[known], p_BinW[known]):
-        now = slice(first, last)
-        up = R_BtoW[known][now, :, 2].mean(axis=0)
-        stand = Stand(
-            float(t_s[known][first]), float(t_s[known][last - 1]), np.median(p_BinW[known][now], axis=0),
-            up / np.linalg.norm(up),
-        )  # fmt: skip
+    for from_s, to_s in _together([_still(track) for track in tracks]):
+        stand = _stand(tracks, from_s, to_s, found.cameras, rig)
+        if stand is None:
+            continue
         if stands and np.linalg.norm(stands[-1].p_BinW - stand.p_BinW) < ANOTHER_M:
             stands.pop()
         stands.append(stand)
@@ -131,13 +130,48 @@ def _refuse_mirror(z_inW: Array, cameras_inW: Array, spot_inW: Array) -> None:
         )
 
 
-def _still(t_s: Array, p: Array) -> list[tuple[int, int]]:
-    """Return the stretches, first to past last, in which a point (n, 3) stays where it is."""
-    stretches, first = [], 0
-    for k in range(1, len(t_s) + 1):
-        if k < len(t_s) and t_s[k] - t_s[k - 1] < GAP_S and np.linalg.norm(p[k] - p[first:k].mean(axis=0)) < STILL_M:
+def _shifted(track: Track, offset_s: float) -> Track:
+    """Return a track by camera 0's clock."""
+    return replace(track, t_s=track.t_s + offset_s)
+
+
+def _still(track: Track) -> list[Span]:
+    """Return from when to when a camera saw the balls stay where they were, a few mistaken frames aside."""
+    t_s, spans = track.t_s, list[Span]()
+    for first, from_s in enumerate(t_s.tolist()):
+        last = int(np.searchsorted(t_s, from_s + LEAST_STILL_S, side="right"))
+        uv = track.uv_px[first:last]
+        if t_s[last - 1] - from_s < NEARLY * LEAST_STILL_S or len(uv) < LEAST_FRAMES:
             continue
-        if t_s[k - 1] - t_s[first] >= LEAST_STILL_S:
-            stretches.append((first, k))
-        first = k
-    return stretches
+        away_px = np.median(np.linalg.norm(uv - np.median(uv, axis=0), axis=2), axis=1)
+        if (away_px < STILL_PX).mean() < MOST:
+            continue
+        begun_s = spans.pop()[0] if spans and spans[-1][1] >= from_s else from_s
+        spans.append((begun_s, float(t_s[last - 1])))
+    return spans
+
+
+def _together(spans: Sequence[Sequence[Span]]) -> list[Span]:
+    """Return the times long enough in which two cameras or more see it stand."""
+    every = [span for each in spans for span in each]
+    edges = sorted([(from_s, 1) for from_s, _ in every] + [(to_s, -1) for _, to_s in every])
+    stood: list[Span] = []
+    count, since_s = 0, 0.0
+    for at_s, change in edges:
+        if count >= 2 and count + change < 2 and at_s - since_s >= NEARLY * LEAST_STILL_S:
+            stood.append((since_s, at_s))
+        if count < 2 <= count + change:
+            since_s = at_s
+        count += change
+    return stood
+
+
+def _stand(tracks: Sequence[Track], from_s: float, to_s: float, cameras: tuple[Camera, ...], rig: Rig) -> Stand | None:
+    """Return the stand of a time; None where the balls make no marker."""
+    uv_px = np.full((len(tracks), len(rig.marker), 2), np.nan)
+    for c, track in enumerate(tracks):
+        stood = (track.t_s >= from_s) & (track.t_s <= to_s)
+        if stood.any():
+            uv_px[c] = np.median(track.uv_px[stood], axis=0)
+    p_BinW, R_BtoW = poses_of(triangulated_from(uv_px, cameras)[None], rig)
+    return Stand(from_s, to_s, p_BinW[0], R_BtoW[0, :, 2]) if np.isfinite(p_BinW).all() else None

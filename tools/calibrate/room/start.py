@@ -65,6 +65,21 @@ def first_scene(seen: Seen, rig: Rig) -> tuple[Scene, Seen]:
     return marker_way(seen, cameras, np.array([poses[c][2] for c in range(len(cameras))]), rig)
 
 
+def check_shared(seen: Seen, rig: Rig) -> None:
+    """Refuse a camera that sees the marker nowhere together with another.
+
+    Raises:
+        OperatorError: its sightings do not meet another's in a triangle of the marker's size.
+    """
+    for camera, count in zip(rig.cameras, seen.there.sum(axis=1).tolist(), strict=True):
+        if count < LEAST_SHARED:
+            raise OperatorError(
+                f"calibrate room: what {camera.name} saw makes a marker with what the others saw in {count} instants, "
+                f"at least {LEAST_SHARED} are needed; check that no picture is mirrored, the lenses, and that no "
+                "camera moved meanwhile"
+            )
+
+
 def placed(camera: Camera, R_CtoW: Array, p_CinW: Array) -> Camera:
     """Return a camera that stands elsewhere."""
     return replace(camera, R_CtoW=frozen_array(R_CtoW), p_CinW=frozen_array(p_CinW))
@@ -79,7 +94,12 @@ def marker_way(seen: Seen, cameras: tuple[Camera, ...], offsets_s: Array, rig: R
 
 def marker_poses(seen: Seen, cameras: tuple[Camera, ...], offsets_s: Array, rig: Rig) -> tuple[Array, Array]:
     """Return p_BinW (m, 3) and R_BtoW (m, 3, 3) at each instant; NaN where the balls make no such triangle."""
-    points_inB, points_inW = rig.marker.points_inB, triangulated(seen, cameras, offsets_s)
+    return poses_of(triangulated(seen, cameras, offsets_s), rig)
+
+
+def poses_of(points_inW: Array, rig: Rig) -> tuple[Array, Array]:
+    """Return p_BinW (m, 3) and R_BtoW (m, 3, 3) by the places of the balls (m, balls, 3); NaN where they do not fit."""
+    points_inB = rig.marker.points_inB
     R, p = rigid(np.broadcast_to(points_inB, points_inW.shape), np.nan_to_num(points_inW))
     balls_inW = points_inB @ np.swapaxes(R, 1, 2) + p[:, None, :]
     off_m = np.linalg.norm(balls_inW - points_inW, axis=2).max(axis=1)

@@ -14,6 +14,7 @@ from tracker.types import Array, BallSighting
 
 GAP = 1.6  # of the median frame period: more is a gap, over which nothing is interpolated
 MOST_APART_S = 0.12  # cameras of 10 Hz are taken, slower ones miss too much of a wave
+LOOSE_S = 0.25  # from a frame to the nearest, for what need only be known roughly
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,6 +58,27 @@ class Track:
         sigma = np.sqrt(np.einsum("mk,mkb->mb", value**2, self.sigma_px[four] ** 2))
         uv[~good] = speed[~good] = sigma[~good] = np.nan
         return uv, speed, sigma
+
+    def roughly(self, t_s: Array) -> tuple[Array, Array]:
+        """Return about where the balls were at stamps t_s (m,) and how fast they moved, over small gaps as well.
+
+        Returns:
+            uv_px (m, balls, 2) and speed (m, balls, 2) [px/s], on straight lines; NaN far from any frame.
+        """
+        if len(self) < 2:
+            nowhere = np.full((len(t_s), *self.uv_px.shape[1:]), np.nan)
+            return nowhere, nowhere.copy()
+        h_s = float(np.median(np.diff(self.t_s)))
+        uv = self._straight(t_s)
+        return uv, (self._straight(t_s + h_s) - self._straight(t_s - h_s)) / (2.0 * h_s)
+
+    def _straight(self, t_s: Array) -> Array:
+        k = np.clip(np.searchsorted(self.t_s, t_s, side="right") - 1, 0, len(self) - 2)
+        start, end = self.t_s[k], self.t_s[k + 1]
+        share = np.clip((t_s - start) / (end - start), 0.0, 1.0)[:, None, None]
+        uv = (1.0 - share) * self.uv_px[k] + share * self.uv_px[k + 1]
+        uv[np.minimum(np.abs(t_s - start), np.abs(t_s - end)) > LOOSE_S] = np.nan
+        return np.asarray(uv)
 
 
 def track_of(sightings: Iterable[tuple[float, Array]], balls: int) -> Track:

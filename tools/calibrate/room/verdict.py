@@ -21,7 +21,7 @@ GOOD_PX, USABLE_PX = 0.5, 1.5  # reprojection and epipolar, held out
 GOOD_CLOCK_MS, USABLE_CLOCK_MS = 0.5, 3.0  # one sigma: at 1 m/s a millisecond is a millimetre
 GOOD_VISITED, USABLE_VISITED = 0.3, 0.1  # of the cells that two cameras see
 GOOD_SEEN_S, USABLE_SEEN_S = 10.0, 4.0
-OUTLIERS = 0.15
+WILD_SHARE = 0.2
 SURE = 3.0  # sigmas from which a difference is no chance
 SIDE_MM = 0.5  # what a ruler errs by
 TAPE_MM = 2.0  # what a tape errs by, one sigma
@@ -137,9 +137,12 @@ def _of_held_out(room: Room) -> Iterator[tuple[Grade, str]]:
             f"the cameras contradict each other by {px:.2f} px, good is {GOOD_PX:g} px: another lens or resolution "
             "than calibrated, a camera that moved, or cameras in another order than the config's",
         )
-    if room.found.adjusted.outliers > OUTLIERS:
-        share = 100.0 * room.found.adjusted.outliers
-        yield Grade.USABLE, f"{share:.0f} % of the sightings fit nothing: something else has the balls' colours"
+    if held_out.wild > WILD_SHARE:
+        yield (
+            Grade.USABLE,
+            f"at {100 * held_out.wild:.0f} % of the instants held out something else was taken for a ball: cover what "
+            "has their colours, `posebridge colours` shows it",
+        )
 
 
 def _of_clocks(room: Room) -> Iterator[tuple[Grade, str]]:
