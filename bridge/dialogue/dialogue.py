@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from bridge.dialogue.heading import ATTITUDE, HeadingWatch
 from bridge.dialogue.news import Facts, News, Saturation
 from bridge.dialogue.origin import Origin, OriginKeeper
-from bridge.dialogue.peer import Peer, PeerWatch
+from bridge.dialogue.peer import Autopilot, Peer, PeerWatch
 from bridge.dialogue.profile import AUTO, Profile, kept_apart, profile_for
 from bridge.dialogue.streams import NOTHING, StreamKeeper, Wanted
-from bridge.dialogue.timesync import TIMESYNC, SyncState, TimeSync
+from bridge.dialogue.timesync import CONVERGED_SAMPLES, TIMESYNC, SyncState, TimeSync
 from bridge.pack import heartbeat
 from bridge.wire import Message, Received
 from tracker.types import Array, Estimate, TrackState
@@ -52,6 +52,7 @@ class DialogueState:
     yaw: what is wrong with our yaw against the vehicle's motion, "" for nothing.
     strangers: messages of others than the autopilot.  unsigned: messages refused for want of a right signature.
     full: whether the link takes less than it is given.  streams: what the autopilot was asked to tell, "" for nothing.
+    by_arrival: whether it counts a pose as of its arrival yet, as PX4 does until its TIMESYNC has had 500 answers.
     """
 
     peer: Peer | None
@@ -67,6 +68,7 @@ class DialogueState:
     yaw: str = ""
     full: bool = False
     streams: str = ""
+    by_arrival: bool = False
 
     @property
     def brief(self) -> str:
@@ -94,6 +96,8 @@ class DialogueState:
             settled = "" if self.sync.converged else ", settling"
             yield f"clock {self.sync.offset_ns / 1e6:+.1f} +- {self.sync.spread_ms:.1f} ms{settled}"
             yield f"round trip {self.sync.rtt_ms:.1f} ms"
+        if self.by_arrival:
+            yield "it counts poses as of their arrival until its own time sync stands"
         if self.full:
             yield "LINK FULL: only the newest poses go, at the rate that fits"
         if self.streams:
@@ -123,7 +127,7 @@ class Dialogue:
         self._heard_ns: int | None = None
         self._beat_due_ns: int | None = None
         self._last_pose_ns: int | None = None
-        self._too_old = self._too_close = 0
+        self._too_old = self._too_close = self._answered = 0
 
     @property
     def peer(self) -> Peer | None:
@@ -151,11 +155,8 @@ class Dialogue:
             self._streams.take(message)
             if message.message == ATTITUDE:
                 self._heading.take(message)
-            if message.message == TIMESYNC and message.whole("tc1") != 0:
-                self._sync.take(message)
-                if self._sync.rebooted:
-                    self._origin.start_anew()
-                    self._streams.start_anew()
+            if message.message == TIMESYNC:
+                self._take_time(message)
 
     def due(self, track: TrackState, now_ns: int, superseded: int = 0) -> list[Message]:
         """Return the messages besides poses that are due at stream time now_ns [ns].
@@ -205,8 +206,19 @@ class Dialogue:
         return DialogueState(
             self.peer, self._is_away(now_ns), self.profile.name, self._sync.state(), origin, self._holding(),
             self._too_old, self._too_close, self._watch.strangers, yaw=self._heading.reading.alarm,
-            full=self._saturation.now, streams=str(self._streams),
+            full=self._saturation.now, streams=str(self._streams), by_arrival=self._by_arrival(),
         )  # fmt: skip
+
+    def _take_time(self, message: Received) -> None:
+        """Take a request of the autopilot, which the ear has answered, or a reply to ours."""
+        if message.whole("tc1") == 0:
+            self._answered += 1
+            return
+        self._sync.take(message)
+        if self._sync.rebooted:
+            self._answered = 0
+            self._origin.start_anew()
+            self._streams.start_anew()
 
     def _holding(self) -> str:
         """Say why poses are held back; an autopilot that can be told its origin is told before the first of them."""
@@ -221,6 +233,9 @@ class Dialogue:
             track, self._late, self._is_away(now_ns), self._saturation.now, restarts, self._watch.other_autopilot,
             self._origin.state, self._heading.reading.brief,
         )  # fmt: skip
+
+    def _by_arrival(self) -> bool:
+        return self.peer is not None and self.peer.autopilot is Autopilot.PX4 and self._answered < CONVERGED_SAMPLES
 
     def _is_away(self, now_ns: int) -> bool:
         return self._heard_ns is not None and now_ns - self._heard_ns > STALE_NS

@@ -56,6 +56,7 @@ AUTOPILOT = json_topic(
     yaw=text("what is wrong with our yaw against the vehicle's motion, empty for nothing"),
     full=_flag("whether the link takes less than it is given"),
     streams=text("what it was asked to tell, and what came of it"),
+    by_arrival=_flag("whether it counts a pose as of its arrival yet: PX4, before its time sync stands"),
     too_old=integer("estimates not sent for their age"),
     too_close=integer("estimates not sent because they followed the last one too closely"),
     strangers=integer("messages of others than the autopilot"),
@@ -196,11 +197,11 @@ def autopilot_value(link: str, state: DialogueState) -> dict[str, Any]:
 
 
 def autopilot_of(value: Mapping[str, Any]) -> DialogueState:
-    """Read an `/autopilot` message back, its clock apart."""
+    """Read an `/autopilot` message back, its clock apart; one of an older log lacks a flag or two."""
     peer = None
     if value["heard"]:
         peer = Peer(value["system_id"], value["component_id"], Autopilot(value["autopilot"]))
-    return DialogueState(peer=peer, sync=None, **{name: value[name] for name in _STATE_FIELDS})
+    return DialogueState(peer=peer, sync=None, **{name: value[name] for name in _STATE_FIELDS if name in value})
 
 
 def link_value(state: LinkState) -> dict[str, Any]:
@@ -214,6 +215,7 @@ def link_of(value: Mapping[str, Any]) -> LinkState:
 
 
 _STATE_FIELDS = (
-    "away", "profile", "origin", "holding", "yaw", "full", "streams", "too_old", "too_close", "strangers", "unsigned",
+    "away", "profile", "origin", "holding", "yaw", "full", "streams", "by_arrival", "too_old", "too_close", "strangers",
+    "unsigned",
 )  # fmt: skip
 _LINK_FIELDS = ("up", "reason", "sent", "dropped", "superseded")

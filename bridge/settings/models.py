@@ -55,6 +55,7 @@ class CameraSettings(Section):
     latency_ms: Annotated[float, Strict(), Field(ge=0, le=1000)] | None = None
     lock: bool = True
     clock_offset_ms: Annotated[float, Strict(), Field(ge=-1000, le=1000)] = 0.0
+    readout_ms: Annotated[float, Strict(), Field(ge=-100, le=100)] = 0.0
 
 
 class MeasuredCameraSettings(Section):
@@ -210,9 +211,10 @@ class LogSettings(Section):
 
 
 class LinkSettings(Section):
-    """One way to an autopilot, and what goes over it at every estimate: the profile's messages unless it names some."""
+    """One way to an autopilot, and what goes over it: the profile's messages and the streams of all, unless it says."""
 
     uri: Name
+    streams_hz: Annotated[float, Strict(), Field(ge=0, le=400)] | None = None
     messages: Annotated[tuple[MessageName, ...], Field(min_length=1)] | None = None
 
     @model_validator(mode="after")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from bridge.dialogue import Origin, Terms
 from bridge.dialogue.streams import Wanted
 from bridge.links import line_bytes_s
-from bridge.settings.models import Settings
+from bridge.settings.models import LinkSettings, MavlinkSettings, Settings
 
 
 def terms_of(settings: Settings, *, logged: bool = False) -> tuple[tuple[str, Terms], ...]:
@@ -13,7 +13,6 @@ def terms_of(settings: Settings, *, logged: bool = False) -> tuple[tuple[str, Te
 
     logged: whether a log is kept; only for that is the autopilot asked to tell of itself.
     """
-    streams_hz = settings.mavlink.streams_hz if logged else 0.0
     told, mavlink = settings.origin, settings.mavlink
     origin = None if told is None else Origin(told.latitude_deg, told.longitude_deg, told.altitude_m)
     age_ns = round(mavlink.max_age_ms * 1e6)
@@ -26,8 +25,13 @@ def terms_of(settings: Settings, *, logged: bool = False) -> tuple[tuple[str, Te
                 mavlink.system_id,
                 origin,
                 age_ns,
-                Wanted(streams_hz, line_bytes_s(link.uri)),
+                Wanted(_streams_hz(link, mavlink) if logged else 0.0, line_bytes_s(link.uri)),
             ),
         )
         for link in settings.links
     )
+
+
+def _streams_hz(link: LinkSettings, mavlink: MavlinkSettings) -> float:
+    """Return how often the autopilot shall tell of itself over a link, whose own word outweighs that for all [Hz]."""
+    return mavlink.streams_hz if link.streams_hz is None else link.streams_hz

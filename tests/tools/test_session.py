@@ -165,3 +165,10 @@ def test_the_autopilot_is_asked_for_streams_only_when_a_log_is_kept(logged: bool
     lab = load_settings("lab").with_links(("udpout:127.0.0.1:9", "serial:/dev/ttyUSB0:57600"))
     streams = [terms.streams for _, terms in terms_of(lab, logged=logged)]
     assert streams == [Wanted(50.0 * logged), Wanted(50.0 * logged, 5760.0)]
+
+
+def test_a_link_with_a_slow_radio_behind_it_may_be_asked_for_less_than_the_others() -> None:
+    lab = load_settings("lab").with_links(("udpout:127.0.0.1:9", "udpout:127.0.0.1:10"))
+    one, other = lab.links
+    slow = lab.model_copy(update={"links": (one, other.model_copy(update={"streams_hz": 4.0}))})
+    assert [terms.streams.rate_hz for _, terms in terms_of(slow, logged=True)] == [50.0, 4.0]

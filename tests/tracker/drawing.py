@@ -71,6 +71,14 @@ def draw_ball(canvas: Array, uv_px: Array, radius_px: float, ball: Ball) -> None
     part += light[cut][..., None] * np.array(ball.colour.bgr)
 
 
+def draw_band(canvas: Array, uv_px: Array, turn_rad: float, aside_px: float, half_px: float, bgr: Array) -> None:
+    """Put a straight band on the canvas, its middle line so far aside of uv_px (2,)."""
+    v, u = np.mgrid[: canvas.shape[0], : canvas.shape[1]]
+    across = (u - uv_px[0]) * np.sin(turn_rad) - (v - uv_px[1]) * np.cos(turn_rad)
+    cover = np.clip(half_px + 0.5 - np.abs(across - aside_px), 0.0, 1.0)[..., None]
+    canvas += cover * (bgr - canvas)
+
+
 def developed(canvas: Array, noise: tuple[float, np.random.Generator] | None = None) -> Image:
     """Return the canvas as an 8-bit image, with sensor noise if wanted."""
     if noise is not None:

@@ -81,3 +81,11 @@ def test_an_error_put_in_is_the_one_that_is_found(theta: Array, v: Array, w: Arr
     dx = np.concatenate((v, 0.5 * theta, w, v - w, v, w, [0.01]))
     assert np.allclose(error_of(start.moved(dx), start), dx, atol=1e-9)
     assert np.allclose(difference(perturbed(start, dx), start.moved(dx)), 0.0, atol=1e-9)
+
+
+def test_the_vector_of_a_state_shows_a_part_that_was_replaced() -> None:
+    carried_on = predict(state(0, v_BinW=np.array([1.0, 2.0, 3.0])), SECOND_NS // 10, PROCESS).state
+    turned_back = replace(carried_on, v_BinW=-carried_on.v_BinW)
+    assert carried_on.mean[12:15].tolist() == carried_on.v_BinW.tolist()
+    assert turned_back.mean[12:15].tolist() == (-carried_on.v_BinW).tolist()
+    assert turned_back.mean[:12].tolist() == carried_on.mean[:12].tolist()

@@ -12,6 +12,7 @@ from tools.simulate.autopilot.parameters import FOR_VISION
 from tools.simulate.helicopter import Helicopter
 from tools.sitl.airframe import VEHICLE
 from tools.sitl.ground import GroundStation
+from tools.sitl.late import LateWire
 from tools.sitl.lockstep import PHYSICS_PORT
 from tools.sitl.pilots import ArduPilot, Own, Radio
 from tools.sitl.process import Simulator, Wiring
@@ -25,6 +26,8 @@ from tracker.errors import OperatorError
 PARAMETERS = "vision.parm"
 BRIDGE_PORT_ABOVE = 2
 """ArduPilot's SERIAL1 listens two ports above SERIAL0."""
+
+LAST_PORT = 65_535
 
 _TCP = re.compile(r"tcp:([^:]+):(\d{1,5})")
 
@@ -101,18 +104,27 @@ def running(uri: str, folder: Path, given: Conditions, radio: Radio) -> Aboard:
         OperatorError: a URI of another form, nobody there, or a physics port that is taken.
     """
     form = _TCP.fullmatch(uri)
-    if form is None:
-        raise OperatorError(f"--connect {uri}: must be tcp:HOST:PORT, SERIAL0 of an ArduPilot SITL")
+    if form is None or not 0 < int(form[2]) <= LAST_PORT - BRIDGE_PORT_ABOVE:
+        most = LAST_PORT - BRIDGE_PORT_ABOVE
+        raise OperatorError(f"--connect {uri}: must be tcp:HOST:PORT, PORT 1 to {most}, SERIAL0 of an ArduPilot SITL")
     (folder / PARAMETERS).write_text(parameter_file(given.delay_ms, {}), encoding="utf-8")
     host, port = form[1], int(form[2])
     with ExitStack() as opened:
         pilot = ArduPilot(given.room_yaw_deg, radio, given.start_ns, PHYSICS_PORT, RADIO_PORT)
         opened.callback(pilot.close)
-        ground = TcpWire(host, port)
-        opened.callback(ground.close)
-        bridge = TcpWire(host, port + BRIDGE_PORT_ABOVE)
+        ground = _ground_wire(host, port, folder / PARAMETERS)
         opened.pop_all()
-    return Aboard(pilot, GroundStation(ground), Relay(bridge), VEHICLE)
+    return Aboard(pilot, GroundStation(ground), Relay(LateWire(host, port + BRIDGE_PORT_ABOVE)), VEHICLE)
+
+
+def _ground_wire(host: str, port: int, parameters: Path) -> TcpWire:
+    try:
+        return TcpWire(host, port)
+    except OperatorError as error:
+        raise OperatorError(
+            f"--connect: {error}; start ArduPilot's SITL with --model JSON:127.0.0.1 --speedup 100 --wipe "
+            f"--defaults {parameters.resolve()} (docs/sitl.md)"
+        ) from error
 
 
 def close(aboard: Aboard) -> None:

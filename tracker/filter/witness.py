@@ -7,7 +7,7 @@ taken with the doubt of such a spot's middle.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +16,7 @@ from tracker.state import ATTITUDE, State
 from tracker.types import BallSighting, frozen_array
 
 OPEN_RAD = 0.005  # one sigma of attitude: well beyond what three balls leave
+WITNESSES = 2  # balls that a camera must see to bear witness against one more: what shows one may be lost itself
 DOUBT_PX = 1.5  # one sigma: half a ball's radius and more
 
 
@@ -27,8 +28,14 @@ def doubted_alone(sightings: Sequence[BallSighting], last: State | None) -> tupl
     cameras = {sighting.camera for sighting in sightings}
     if last is None or len(cameras) < 2 or float(last.P.diagonal()[ATTITUDE].max()) < OPEN_RAD**2:
         return tuple(sightings)
-    seen = [sighting.ball for sighting in sightings]
-    return tuple(_doubted(one) if seen.count(one.ball) == 1 else one for one in sightings)
+    seen = {camera: {s.ball for s in sightings if s.camera == camera} for camera in cameras}
+    return tuple(_doubted(one) if _denied(one.ball, seen) else one for one in sightings)
+
+
+def _denied(ball: int, seen: Mapping[int, Collection[int]]) -> bool:
+    """Say whether one camera alone sees a ball, and another does not that sees others well enough to be asked."""
+    deniers = [balls for balls in seen.values() if ball not in balls]
+    return len(deniers) == len(seen) - 1 and max(len(balls) for balls in deniers) >= WITNESSES
 
 
 def _doubted(sighting: BallSighting) -> BallSighting:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.image.doubt import NORMAL, OCTANTS, add_octants, disagreement, doubted_covariance
 from tracker.image.patch import LUMA, TRUST, X, Y
 from tracker.image.reading import CHROMA_VAR, LUMA_VAR, read
 from tracker.maths.compiled import compiled
@@ -150,10 +151,12 @@ def _add_channel(
 def _linearise(pixels: Array, drawn: Array, tukey: Array, work: Array, squares: Array, normal: Array) -> None:
     """Linearise the brightness or the colour of a patch about the centre that a ball was drawn at, see `draw_at`.
 
-    work (m + 4, n): overwritten.  Fills in squares (n,) and normal (5,) as `_add_channel` does.
+    work (m + 1 + 3 channels, n): overwritten, its last rows by what each channel leaves and its slopes by u and by v.
+    Fills in squares (n,) and normal (5,) as `_add_channel` does.
     """
-    m, channels = len(work) - 4, len(pixels) - LUMA
-    weight = work[m + 3]
+    channels = len(pixels) - LUMA
+    m = len(work) - 1 - 3 * channels
+    weight = work[m]
     for i in range(len(weight)):
         weight[i] = (tukey[i] * pixels[TRUST, i]) ** 2
     factor, coefficients, T = np.empty((m, m)), np.empty((channels, m)), np.empty((2, m))
@@ -162,7 +165,8 @@ def _linearise(pixels: Array, drawn: Array, tukey: Array, work: Array, squares: 
     fit_linear(pixels, drawn[:m], weight, work[:m], factor, coefficients)
     for channel in range(channels):
         c = coefficients[channel]
-        _add_channel(pixels, drawn, weight, work[:m], channel, factor, c, work[m : m + 3], T, squares, normal)
+        rows = work[m + 1 + 3 * channel : m + 4 + 3 * channel]
+        _add_channel(pixels, drawn, weight, work[:m], channel, factor, c, rows, T, squares, normal)
 
 
 @compiled("f8(f8[::1], f8[::1], i8, i8, f8[::1])")
@@ -211,10 +215,11 @@ def gauss_newton(
     """Fit from a start (u, v), pixels from the patch's middle; fill in u, v, covariance uu, uv, vv and misfit."""
     p, n_bright, n_colour = luma.shape[2], bright.shape[1], colour.shape[1]
     drawn_b, drawn_c = np.empty((rows_of(p), n_bright)), np.empty((rows_of(p), n_colour))
-    work_b, work_c = np.empty((p + PLANE + 4, n_bright)), np.empty((p + PLANE + 4, n_colour))
-    tukey_b, squares_b, normal = np.ones(n_bright), np.empty(n_bright), np.empty(5)
-    tukey_c, squares_c, normal_c = np.ones(n_colour), np.empty(n_colour), np.empty(5)
-    misfit = det = 0.0
+    work_b, work_c = np.empty((p + PLANE + 4, n_bright)), np.empty((p + PLANE + 7, n_colour))
+    tukey_b, squares_b, normal_b = np.ones(n_bright), np.empty(n_bright), np.empty(NORMAL)
+    tukey_c, squares_c, normal_c = np.ones(n_colour), np.empty(n_colour), np.empty(NORMAL)
+    octants, normal = np.zeros((OCTANTS, NORMAL)), np.empty(NORMAL)
+    misfit_b = misfit_c = at_u = at_v = 0.0
     drawn_u = drawn_v = np.inf  # where the ball is drawn: nowhere yet
     for iteration in range(ITERATIONS):
         at_u, at_v = on_lattice(u), on_lattice(v)
@@ -222,12 +227,11 @@ def gauss_newton(
             draw_at(bright, luma, luma_made, ball, LUMA_VAR, at_u, at_v, drawn_b)
             draw_at(colour, chroma, chroma_made, ball, CHROMA_VAR, at_u, at_v, drawn_c)
             drawn_u, drawn_v = at_u, at_v
-        _linearise(bright, drawn_b, tukey_b, work_b, squares_b, normal)
+        _linearise(bright, drawn_b, tukey_b, work_b, squares_b, normal_b)
         _linearise(colour, drawn_c, tukey_c, work_c, squares_c, normal_c)
-        misfit_b = _misfit(squares_b, tukey_b, 1, p, normal)
+        misfit_b = _misfit(squares_b, tukey_b, 1, p, normal_b)
         misfit_c = _misfit(squares_c, tukey_c, 2, p, normal_c)
-        misfit = (misfit_b * n_bright + misfit_c * 2 * n_colour) / (n_bright + 2 * n_colour)
-        normal += normal_c
+        normal[:] = normal_b + normal_c
         det = normal[0] * normal[2] - normal[1] * normal[1]
         new_u = at_u + min(1.0, max(-1.0, (normal[2] * normal[3] - normal[1] * normal[4]) / det))
         new_v = at_v + min(1.0, max(-1.0, (normal[0] * normal[4] - normal[1] * normal[3]) / det))
@@ -239,8 +243,10 @@ def gauss_newton(
             _doubt(squares_b, 1, tukey_b)
             _doubt(squares_c, 2, tukey_c)
     fit[0], fit[1] = u, v
-    fit[2], fit[3], fit[4] = normal[2] / det, -normal[1] / det, normal[0] / det
-    fit[5] = misfit
+    add_octants(bright, work_b[p + PLANE + 1 :], at_u, at_v, 1.0 / max(1.0, misfit_b), octants)
+    add_octants(colour, work_c[p + PLANE + 1 :], at_u, at_v, 1.0 / max(1.0, misfit_c), octants)
+    doubted_covariance(normal, disagreement(normal_b, normal_c), octants, u - at_u, v - at_v, fit[2:5])
+    fit[5] = (misfit_b * n_bright + misfit_c * 2 * n_colour) / (n_bright + 2 * n_colour)
 
 
 @compiled("f8(f8[:, ::1], Array(float32, 3, 'C', True), f8[::1], f8[::1], i8, f8, f8, f8[:, ::1])")

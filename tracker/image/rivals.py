@@ -46,7 +46,7 @@ class Rivals:
     @property
     def lessons_due(self) -> int:
         """Return how often to go over the first images again, since nothing else is known yet."""
-        return FIRST_LESSONS if not self.settled and self.count <= FIRST_BALLS else 0
+        return FIRST_LESSONS if self.best.light.count <= FIRST_BALLS else 0
 
     @property
     def settled(self) -> bool:

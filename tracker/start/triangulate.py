@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from tracker.maths.compiled import compiled
 from tracker.types import Array, Point, Reason, Rejected, frozen_array
 
-PARALLAX_LIMIT_RAD = np.radians(2.0)
+PARALLAX_LIMIT_RAD = float(np.radians(2.0))
+PARALLEL_COSINE = float(np.cos(PARALLAX_LIMIT_RAD))
 
 
 def triangulate(u_inW: Array, p_CinW: Array, sigma_bearing: float) -> Point | Rejected:
@@ -23,17 +25,43 @@ def triangulate(u_inW: Array, p_CinW: Array, sigma_bearing: float) -> Point | Re
         error e_i moves ray i by |p - c_i| e_i at the point, so cov p = (sum M_i)^-1 (sum s_i^2 M_i) (sum M_i)^-1
         with s_i = sigma |p - c_i| (2).
     """
-    cosine = float(np.min(np.abs(u_inW @ u_inW.T)))
-    if cosine > np.cos(PARALLAX_LIMIT_RAD):
+    found, place, covariance = np.empty(3), np.empty(3), np.empty((3, 3))
+    _nearest(np.ascontiguousarray(u_inW), np.ascontiguousarray(p_CinW), sigma_bearing, found, place, covariance)
+    cosine, least_reach_m, miss_m = found.tolist()
+    if cosine > PARALLEL_COSINE:
         angle = np.degrees(np.arccos(min(1.0, cosine)))
         return Rejected(Reason.PARALLAX, f"rays {angle:.2f} deg apart, least {np.degrees(PARALLAX_LIMIT_RAD):.0f} deg")
-    M = np.eye(3) - u_inW[:, :, None] * u_inW[:, None, :]
-    inverse = np.linalg.inv(M.sum(axis=0))
-    p = inverse @ np.einsum("nij,nj->i", M, p_CinW)  # (1)
-    reach = p - p_CinW
-    if float((reach * u_inW).sum(axis=1).min()) <= 0.0:
+    if least_reach_m <= 0.0:
         return Rejected(Reason.BEHIND, "rays meet behind a camera")
-    miss = np.einsum("nij,nj->ni", M, reach)
-    spread = sigma_bearing**2 * (reach**2).sum(axis=1)
-    covariance = inverse @ np.einsum("n,nij->ij", spread, M) @ inverse  # (2)
-    return Point(frozen_array(p), frozen_array(covariance), float(np.sqrt((miss**2).sum(axis=1).mean())))
+    return Point(frozen_array(place), frozen_array(covariance), miss_m)
+
+
+@compiled("void(Array(f8, 2, 'C', readonly=True), Array(f8, 2, 'C', readonly=True), f8, f8[::1], f8[::1], f8[:, ::1])")
+def _nearest(u: Array, c: Array, sigma: float, found: Array, p: Array, covariance: Array) -> None:
+    """Fill in the point (3,) nearest the rays u (n, 3) from c (n, 3), and its covariance (3, 3), unless too parallel.
+
+    found (3,): the least cosine between two rays, the least reach along one, the rms of what they miss the point by.
+    """
+    n, total, right, spread = len(u), np.zeros((3, 3)), np.zeros(3), np.zeros((3, 3))
+    found[0], found[1], squares = 1.0, np.inf, 0.0
+    for k in range(n):
+        for other in range(k):
+            found[0] = min(found[0], abs(u[k, 0] * u[other, 0] + u[k, 1] * u[other, 1] + u[k, 2] * u[other, 2]))
+        for i in range(3):
+            for j in range(3):
+                M = (1.0 if i == j else 0.0) - u[k, i] * u[k, j]
+                total[i, j] += M
+                right[i] += M * c[k, j]
+    if found[0] > PARALLEL_COSINE:
+        return
+    inverse = np.linalg.inv(total)
+    p[:] = inverse @ right  # (1)
+    for k in range(n):
+        reach = p - c[k]
+        along, distance2 = (reach * u[k]).sum(), (reach * reach).sum()
+        found[1] = min(found[1], along)
+        miss = reach - along * u[k]
+        squares += (miss * miss).sum()
+        spread += sigma * sigma * distance2 * (np.eye(3) - np.outer(u[k], u[k]))
+    found[2] = np.sqrt(squares / n)
+    covariance[:] = inverse @ spread @ inverse  # (2)

@@ -236,3 +236,17 @@ def test_a_full_link_and_what_was_asked_for_stand_in_the_far_ends_line() -> None
     assert "LINK FULL: only the newest poses go, at the rate that fits" in str(state)
     assert "its streams: 0 of 6 at" in str(state)
     assert "all that the line has room for" in str(state)
+
+
+@pytest.mark.parametrize(
+    ("kind", "asked", "by_arrival"), [("PX4", 499, True), ("PX4", 500, False), ("GENERIC", 0, False)]
+)
+def test_a_px4_counts_poses_as_of_their_arrival_until_it_has_had_500_answers(
+    kind: str, asked: int, by_arrival: bool
+) -> None:
+    dialogue = met(kind)
+    questions = [from_autopilot("TIMESYNC", BASE_NS + k, system_id=3, tc1=0, ts1=1 + k) for k in range(asked)]
+    dialogue.take(questions)
+    state = dialogue.state(BASE_NS + 1000)
+    assert state.by_arrival is by_arrival
+    assert ("as of their arrival" in str(state)) is by_arrival

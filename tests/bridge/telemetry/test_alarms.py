@@ -144,3 +144,8 @@ def test_any_order_of_faults_keeps_what_is_remembered_bounded() -> None:
         readings = choices[int(generator.integers(len(choices)))]
         standing = advance(standing, replace(readings, t_ns=k * SECOND_NS // 5))
         assert len(standing) <= 2 * len(RULES)
+
+
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.name)
+def test_a_rule_does_not_mention_what_is_well(rule: Rule) -> None:
+    assert list(rule.judge(WELL)) == []

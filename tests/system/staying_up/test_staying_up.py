@@ -47,10 +47,9 @@ def test_an_autopilot_that_reboots_is_told_its_origin_again_and_keeps_its_profil
         yield from until(lambda: settled(flight) and bool(autopilot.poses()), autopilot.turn)
         assert (flight.far().profile, autopilot.told_origins()) == ("ardupilot", 1)
         autopilot.boot()
-        yield from until(lambda: restarts(flight) == 1, autopilot.turn)
-        assert flight.far().origin != str(OriginState.SET)
+        yield from until(lambda: flight.far().origin != str(OriginState.SET), autopilot.turn)
         assert flight.far().profile == "ardupilot"
-        yield from until(lambda: settled(flight), autopilot.turn)
+        yield from until(lambda: settled(flight) and restarts(flight) == 1, autopilot.turn)
         before = len(autopilot.poses())
         yield from until(lambda: len(autopilot.poses()) > before, autopilot.turn)
         assert autopilot.told_origins() == 1

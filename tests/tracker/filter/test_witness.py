@@ -43,6 +43,12 @@ def test_a_camera_that_sees_alone_needs_no_other() -> None:
     assert doubted_alone(sightings, state(10.0 * OPEN_RAD)) == tuple(sightings)
 
 
+def test_a_camera_that_sees_a_single_ball_bears_no_witness_against_one_that_sees_all() -> None:
+    """What shows but one ball is as likely lost itself, on a thing of that ball's colour."""
+    sightings = seen((0, 0), (0, 1), (0, 2), (1, 2))
+    assert doubted_alone(sightings, state(10.0 * OPEN_RAD)) == tuple(sightings)
+
+
 def test_one_open_axis_is_enough() -> None:
     known = state(0.3 * OPEN_RAD)
     P = known.P.copy()

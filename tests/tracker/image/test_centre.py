@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tests.tracker.drawing import developed, draw_ball, empty_canvas
+from tests.tracker.drawing import developed, draw_ball, draw_band, empty_canvas
 from tests.tracker.paper_rig import paper_rig
 from tracker.image.appearance import Appearance
 from tracker.image.centre import Centre, fit_centre
@@ -18,6 +18,7 @@ CAMERA = RIG.cameras[0]
 BALL = RIG.marker.balls[1]
 RADIUS_PX = 2.8  # the paper's ball in the middle of the room
 SHARP = Response(0.2, 0.2, detail=1.0)
+TUBE_BGR, SKIN_BGR = np.array([38.0, 36.0, 35.0]), np.array([118.0, 142.0, 198.0])
 
 
 def expected(uv_px: Array, radius_px: float = RADIUS_PX) -> Expected:
@@ -86,12 +87,14 @@ def test_the_mean_error_over_many_places_is_small_though_the_light_is_not_known(
     assert np.std(errors, axis=0).max() < 0.04
 
 
-def test_the_covariance_is_one_and_grows_with_the_noise() -> None:
+def test_the_covariance_is_one_and_grows_with_the_noise_once_the_light_is_known() -> None:
+    """Before, what light there may be leaves more to doubt than noise does."""
     rng = np.random.default_rng(5)
     uv_px = np.array([300.4, 200.2])
-    sigmas = []
+    what, sigmas = accustomed(RADIUS_PX).expected_like(expected(uv_px), CAMERA, uv_px), []
     for level in (0.5, 4.0, 12.0):
-        found = fitted(picture(uv_px, noise=(level, rng)), uv_px)
+        found = fit_centre(picture(uv_px, noise=(level, rng)), what)
+        assert isinstance(found, Centre)
         assert np.allclose(found.cov_px, found.cov_px.T)
         assert np.linalg.eigvalsh(found.cov_px).min() > 0.0
         sigmas.append(float(np.sqrt(np.trace(found.cov_px))))
@@ -109,6 +112,23 @@ def test_errors_are_of_the_size_that_the_covariance_says() -> None:
         error = found.uv_px - uv_px
         nees.append(error @ np.linalg.solve(found.cov_px, error))
     assert 2.0 / 3.0 < np.mean(nees) < 6.0
+
+
+@pytest.mark.parametrize(("half_px", "bgr"), [(0.7, TUBE_BGR), (8.0, SKIN_BGR)], ids=["tube", "hand"])
+def test_a_ball_partly_hidden_is_within_five_sigma(half_px: float, bgr: Array) -> None:
+    """Beside 0.02 px, which a camera's noise is never less than; 28.7 is chi-square's for two errors."""
+    rng, known = np.random.default_rng(7), accustomed(RADIUS_PX)
+    for _ in range(60):
+        uv_px = rng.uniform((200, 200), (400, 300))
+        canvas = empty_canvas(CAMERA)
+        draw_ball(canvas, uv_px, RADIUS_PX, BALL)
+        turn_rad, cut_px = rng.uniform(0.0, 2.0 * np.pi), rng.uniform(-0.8, 0.8) * RADIUS_PX
+        aside_px = cut_px if half_px < RADIUS_PX else half_px + abs(cut_px)
+        draw_band(canvas, uv_px, turn_rad, aside_px, half_px, bgr)
+        found = fit_centre(developed(canvas, (1.0, rng)), known.expected_like(expected(uv_px), CAMERA, uv_px))
+        if isinstance(found, Centre):
+            error = found.uv_px - uv_px
+            assert error @ np.linalg.solve(found.cov_px + 0.02**2 * np.eye(2), error) < 28.7
 
 
 @pytest.mark.parametrize("uv_px", [(1.0, 200.0), (200.0, 2.0), (638.5, 200.0), (200.0, 478.0), (-5.0, -5.0)])
