@@ -139,7 +139,7 @@ def test_the_last_three_spots_count_and_a_third_on_either_side_gives_the_same_fl
 
 def track(instants: int, sway_px: float) -> Track:
     """Return a marker that goes to and fro in a picture."""
-    t_s: Array = 0.05 * np.arange(instants, dtype=np.float64)
+    t_s: Array = 0.1 * np.arange(instants, dtype=np.float64)
     middles = 300.0 + sway_px * np.sin(20.0 * t_s)
     return Track(t_s, np.tile(middles[:, None, None], (1, 3, 2)), np.full((instants, 3), 0.1))
 
@@ -149,6 +149,7 @@ def track(instants: int, sway_px: float) -> Track:
     [
         ((track(0, 0.0), track(0, 0.0)), (90, 90), "no marker in 180 pictures: all 3 balls must be seen at once"),
         ((track(90, 80.0), track(4, 80.0)), (90, 90), "cam1 saw all 3 balls in 4 of 90 pictures"),
+        ((track(40, 80.0), track(40, 80.0)), (40, 40), "the marker was seen for 3.9 s, at least 5 s are needed"),
         ((track(90, 80.0), track(0, 0.0)), (90, 0), "cam1 gave no picture"),
         ((track(90, 80.0), track(90, 2.0)), (90, 90), r"hardly moved before cam1 \(2 px rms, at least 15 px\)"),
     ],
