@@ -1,4 +1,4 @@
-"""Which calibration counts: the config's, else the source's, else the nominal cameras of the config."""
+"""Which calibration counts: the config's own, else the source's, else the nominal cameras of the config."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ class RigOrigin(StrEnum):
     """Where the cameras of a rig come from."""
 
     CALIBRATION = "calibration"  # the directory the config names
+    MEASURED = "measured"  # the config's cameras, measured in the room
     SOURCE = "source"  # the recording brought it
     NOMINAL = "nominal"  # the drawing: [[rig.cameras]]
 
@@ -81,9 +82,12 @@ def marker_of(marker: MarkerSettings) -> Marker:
 def _cameras(settings: Settings, source: tuple[Camera, ...] | None) -> tuple[tuple[Camera, ...], RigOrigin]:
     if settings.rig.calibration:
         return _calibrated(Path(settings.rig.calibration)), RigOrigin.CALIBRATION
+    listed = tuple(camera_of(camera) for camera in settings.rig.cameras)
+    if settings.rig.measured is not None:
+        return listed, RigOrigin.MEASURED
     if source is not None:
         return source, RigOrigin.SOURCE
-    return tuple(camera_of(camera) for camera in settings.rig.cameras), RigOrigin.NOMINAL
+    return listed, RigOrigin.NOMINAL
 
 
 def _calibrated(directory: Path) -> tuple[Camera, ...]:

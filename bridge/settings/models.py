@@ -58,10 +58,38 @@ class CameraSettings(Section):
     readout_ms: Annotated[float, Strict(), Field(ge=-100, le=100)] = 0.0
 
 
+class MeasuredCameraSettings(Section):
+    """What one camera's place and clock are known to, one sigma: x, y, z of the room; turns about its own axes."""
+
+    name: Name
+    position_sigma_mm: Triple
+    attitude_sigma_deg: Triple
+    clock_sigma_ms: NotNegative
+
+
+class MeasuredSettings(Section):
+    """How the rig's cameras were measured: they count before a source's own. Written by `posebridge calibrate room`."""
+
+    on: Name
+    by: str = ""
+    source: Name
+    verdict: Literal["good", "usable", "not good"]
+    reasons: tuple[str, ...] = ()
+    frame: Literal["spots", "config"]
+    point_mm: Real
+    worst_point_mm: Real
+    spacing_mm: Real
+    spacing_95_mm: Real
+    reprojection_px: Real
+    epipolar_px: Real
+    cameras: tuple[MeasuredCameraSettings, ...] = ()
+
+
 class RigSettings(Section):
-    """The cameras: a calibration directory, absolute once loaded, or the nominal ones."""
+    """The cameras: a calibration directory, absolute once loaded, or those listed: nominal, or measured."""
 
     calibration: str = ""
+    measured: MeasuredSettings | None = None
     cameras: tuple[CameraSettings, ...] = ()
 
     @model_validator(mode="after")

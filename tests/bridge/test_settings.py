@@ -71,7 +71,9 @@ def test_the_lab_config_loads_by_name_and_by_path() -> None:
 
 def test_the_lab_config_states_every_key_so_that_each_one_is_explained() -> None:
     every_key = re.sub(r"(?m)^# (\w+ = )", r"\1", LAB)
-    assert keys_of(tomllib.loads(every_key)) == keys_of(Settings)
+    known: typing.Any = keys_of(Settings)
+    known["rig"].pop("measured")  # no operator writes it: `calibrate room` does, with comments of its own
+    assert keys_of(tomllib.loads(every_key)) == known
 
 
 def test_a_key_left_out_has_the_value_the_lab_config_shows(write: Write) -> None:

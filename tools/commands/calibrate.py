@@ -1,4 +1,4 @@
-"""`posebridge calibrate`: boards, cameras, and files of other programs."""
+"""`posebridge calibrate`: boards, cameras, rooms, and files of other programs."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Annotated
 
 import typer
 
-from tools.commands.common import ConfigOption, JsonOption, clocks_of
+from tools.commands.common import ConfigOption, JsonOption, SourceOption, clocks_of, tell_of_compiling
 
 EXIT_CALIBRATION_NOT_GOOD = 1
 
-calibrate = typer.Typer(help="Calibrate cameras: print a board, find intrinsics, convert files (docs/calibrate.md).")
+calibrate = typer.Typer(help="Calibrate cameras: print a board, find lenses, find the room, convert files.")
 
 KindOption = Annotated[str, typer.Option("--board", help="charuco or chessboard.", metavar="KIND")]
 CornersOption = Annotated[str, typer.Option(help="Inner corners of the board, as OpenCV counts them.", metavar="CxR")]
@@ -98,4 +98,53 @@ def intrinsics(
     board = make_board(kind_of(kind), corners, square_mm, marker_mm, dictionary)
     request = IntrinsicsRequest(config, source, board, coefficients, distance_m, out, to, picture, overwrite, json)
     if not run_intrinsics(request, clocks_of(context)).good:
+        raise typer.Exit(EXIT_CALIBRATION_NOT_GOOD)
+
+
+@calibrate.command()
+def room(
+    context: typer.Context,
+    config: ConfigOption = "lab",
+    source: SourceOption = "camera:0,1",
+    cameras: Annotated[
+        list[Path] | None,
+        typer.Option(help="Lenses, as from calibrate intrinsics; the config's if left out. May be given again."),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Write the room file here: the config with these cameras.", metavar="ROOM.toml")
+    ] = None,
+    frame: Annotated[
+        str, typer.Option(help="spots: level, heading and origin by three spots; config: by the config's cameras.")
+    ] = "spots",
+    apart_mm: Annotated[
+        float | None, typer.Option("--apart_mm", "--apart-mm", help="From the first spot to the second, by tape.")
+    ] = None,
+    origin_mm: Annotated[
+        str,
+        typer.Option(
+            "--origin_mm", "--origin-mm", help="The marker's middle in the room on the first spot.", metavar="X,Y,Z"
+        ),
+    ] = "0,0,0",
+    refine_intrinsics: Annotated[
+        bool, typer.Option("--refine-intrinsics", help="Adjust focal lengths and centres as well.")
+    ] = False,
+    by: Annotated[str, typer.Option(help="Who measured, for the room file.", metavar="NAME")] = "",
+    seconds: Annotated[float, typer.Option(help="Of footage to read at most.")] = 180.0,
+    overwrite: OverwriteOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Find where the cameras hang and how their clocks differ, from the marker waved through the room.
+
+    Then the vehicle stands for 3 s on each of three level spots: the first is the origin, the second lies along x, the
+    third aside (docs/room.md). Exit code 0: good or usable. 1: not good, with the reasons. 2: something to mend first.
+    """
+    from tools.calibrate.room.session import RoomRequest, run_room
+    from tools.calibrate.room.verdict import Grade
+
+    request = RoomRequest(
+        config, source, tuple(cameras or ()), frame, origin_mm, apart_mm, refine_intrinsics, by, seconds, out,
+        overwrite, json,
+    )  # fmt: skip
+    tell_of_compiling()
+    if run_room(request, clocks_of(context)).grade is Grade.NOT_GOOD:
         raise typer.Exit(EXIT_CALIBRATION_NOT_GOOD)

@@ -13,6 +13,7 @@ import numpy as np
 from tracker.errors import OperatorError
 from tracker.maths import so3
 from tracker.sources.random_flight import random_flight
+from tracker.sources.waving import waved_and_set_down
 from tracker.types import Array
 
 Pose = tuple[Array, Array]
@@ -30,6 +31,7 @@ _GRAVITY = 9.81
 _MAX_TILT = math.radians(20.0)
 _STEP_M, _TILT_STEP, _YAW_STEP = 0.05, math.radians(5.0), math.radians(10.0)
 _REPEATS = 3
+WAVED, WAVED_S = "waved", 10.4  # for `posebridge calibrate room`: with the spots after it 20 s in all
 
 
 class Vehicle(Protocol):
@@ -62,7 +64,7 @@ class ScriptedPath:
 
 
 def scripted_path(name: str, start_ns: int) -> ScriptedPath:
-    """Find a path by its name: one of PATHS, or random-SEED for a flight made up from a number.
+    """Find a path by its name: one of PATHS, random-SEED for a flight made up from a number, or `waved`: by hand.
 
     Raises:
         OperatorError: no path of that name.
@@ -70,8 +72,10 @@ def scripted_path(name: str, start_ns: int) -> ScriptedPath:
     seed = name.removeprefix("random-")
     if seed != name and seed.isdecimal():
         return ScriptedPath(name, random_flight(int(seed)), start_ns)
+    if name == WAVED:
+        return ScriptedPath(name, waved_and_set_down(1, WAVED_S), start_ns)
     if name not in PATHS:
-        known = ", ".join((*PATHS, "random-SEED"))
+        known = ", ".join((*PATHS, "random-SEED", WAVED))
         raise OperatorError(f"source sim:{name}: no path of that name; known are {known}")
     return ScriptedPath(name, PATHS[name], start_ns)
 

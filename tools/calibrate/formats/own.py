@@ -62,14 +62,15 @@ def write_own(cameras: Sequence[Camera], path: Path, remarks: Sequence[str] = ()
     document.add(tomlkit.nl())
     tables = tomlkit.aot()
     for camera in cameras:
-        tables.append(_table(camera))
+        tables.append(camera_table(camera))
     rig = tomlkit.table(is_super_table=True)
     rig.add("cameras", tables)
     document.add("rig", rig)
     write_text(path, tomlkit.dumps(document))
 
 
-def _table(camera: Camera) -> tomlkit.items.Table:
+def camera_table(camera: Camera) -> tomlkit.items.Table:
+    """Return one camera as a table of [[rig.cameras]]."""
     table = tomlkit.table()
     table.add("name", camera.name)
     table.add("width_px", camera.width_px)

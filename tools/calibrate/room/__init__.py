@@ -1,0 +1,1 @@
+"""`posebridge calibrate`: where the room's cameras stand, from what they see."""

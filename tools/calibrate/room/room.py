@@ -1,0 +1,131 @@
+"""A room, calibrated: cameras in the room's frame, and all that is known of how good they are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from tools.calibrate.room.certainty import camera_covariance, turned
+from tools.calibrate.room.footage import Footage
+from tools.calibrate.room.gauge import moved
+from tools.calibrate.room.held_out import HeldOut, judged
+from tools.calibrate.room.jacobian import CAMERA
+from tools.calibrate.room.sides import Side, measured_sides
+from tools.calibrate.room.solve import Found, find_cameras
+from tools.calibrate.room.spots import Floor, find_stands, floor_of
+from tools.calibrate.room.volume import Volume, surveyed
+from tracker.camera import Camera
+from tracker.errors import OperatorError
+from tracker.rig import Rig
+from tracker.types import Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Terms:
+    """What the operator says of the room.
+
+    by_spots: gravity and heading come from three spots, else from the config's cameras.
+    origin_m (3,): where in the room the marker's middle is on the first spot.
+    apart_m: measured distance of the first two spots, None if nobody did.  volume_m (3,): the config's.
+    lenses: refine them.
+    """
+
+    by_spots: bool
+    origin_m: Array
+    apart_m: float | None
+    volume_m: Array
+    lenses: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Room:
+    """cameras: in the room's frame, with their clocks.  covariance (7 n, 7 n): see `certainty.camera_covariance`.
+
+    seen_s: how long each camera saw the marker together with another [s].
+    """
+
+    cameras: tuple[Camera, ...]
+    covariance: Array
+    found: Found
+    held_out: HeldOut
+    volume: Volume
+    sides: tuple[Side, ...]
+    floor: Floor | None
+    apart_m: float | None
+    seen_s: tuple[float, ...]
+
+    def position_mm(self, c: int) -> Array:
+        """Return one sigma of a camera's position (3,) in the room, against the other cameras [mm]."""
+        return 1e3 * self._sigmas(c)[:3]
+
+    def attitude_deg(self, c: int) -> Array:
+        """Return one sigma of a camera's turn (3,) about its own x (right), y (down) and axis [deg]."""
+        return np.asarray(np.degrees(self._sigmas(c)[3:6]))
+
+    def clock_ms(self, c: int) -> float:
+        """Return one sigma of a camera's clock against camera 0's [ms]."""
+        return float(1e3 * self._sigmas(c)[6])
+
+    @property
+    def spot_mm(self) -> float:
+        """Return one sigma of a spot's place [mm]: the cameras' errors, and those of what stands still."""
+        cameras_mm = self.volume.point_mm if self.volume.cells else 0.0
+        return float(np.hypot(np.nan_to_num(cameras_mm), np.nan_to_num(self.held_out.spacing_mm)))
+
+    def _sigmas(self, c: int) -> Array:
+        return np.sqrt(np.diag(self.covariance)[CAMERA * c : CAMERA * (c + 1)])
+
+
+def calibrate_room(footage: Footage, rig: Rig, terms: Terms) -> Room:
+    """Find the cameras, put them into the room's frame, and measure how good they are.
+
+    Raises:
+        OperatorError: footage that tells nothing, or no spots where they are wanted.
+    """
+    found = find_cameras(footage, rig, lenses=terms.lenses)
+    floor = None
+    R, p = np.eye(3), np.zeros(3)
+    if terms.by_spots:
+        hung = np.array([camera.p_CinW for camera in found.cameras])
+        floor = floor_of(find_stands(found, rig), hung, terms.origin_m)
+        R, p = floor.R_WtoF, floor.p_WinF
+    else:
+        _refuse_upside_down(found)
+    scene = moved(found.scene, R, p)
+    cameras = tuple(
+        replace(camera, clock_offset_ns=timed.clock_offset_ns)
+        for camera, timed in zip(scene.cameras, found.cameras, strict=True)
+    )
+    to_room = scene.cameras[0].R_CtoW @ found.adjusted.scene.cameras[0].R_CtoW.T
+    covariance = turned(camera_covariance(found.adjusted), to_room)
+    return Room(
+        cameras,
+        covariance,
+        found,
+        judged(found, rig),
+        surveyed(cameras, covariance, scene.p_BinW, terms.volume_m),
+        measured_sides(found, rig),
+        floor,
+        terms.apart_m,
+        _seen_s(found),
+    )
+
+
+def _refuse_upside_down(found: Found) -> None:
+    up = float(found.scene.R_BtoW[:, 2, 2].mean())
+    if up < 0.0:
+        raise OperatorError(
+            "calibrate room: MIRRORED: by the order of its colours the marker was carried upside down most of the "
+            "time; two places in [[marker.balls]] are swapped, or the cameras' pictures are mirrored (switch off the "
+            "driver's flip); if you did carry it so, carry it upright"
+        )
+
+
+def _seen_s(found: Found) -> tuple[float, ...]:
+    """Return how long each camera saw the marker together with another [s]."""
+    there = np.concatenate((found.seen.there, found.held_out.there), axis=1)
+    shared = (there & (there.sum(axis=0) >= 2)).sum(axis=1)
+    instants = np.concatenate((found.seen.t_s, found.held_out.t_s))
+    span_s = max(float(np.ptp(track.t_s)) for track in found.tracks if len(track))
+    return tuple((shared / max(1, len(instants)) * span_s).tolist())
