@@ -1,0 +1,116 @@
+"""One camera's memory of the room behind the vehicle, and whether it still sees it where it was.
+
+    choose patches, away from the balls -> look up a few of them each round -> after each has had its turn, one Shift
+    -> beyond doubt in passes one after the other: moved
+
+No hand, no vehicle and no change of light moves most of a room at once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracker.camera import Camera
+from tracker.health.patch import FAR_PX, NEAR_PX, Patch, choose_patches
+from tracker.health.shift import LEAST_PATCHES, Shift, find_shift
+from tracker.health.values import Witness
+from tracker.types import Array, Image
+
+PASS_NS = 3_000_000_000  # in which each patch has its turn; after something has moved, in a quarter of it
+LIMIT_PX, SIGMAS = 0.3, 4.0  # a picture that has moved further beyond doubt is no longer that of the calibration
+PASSES = 2  # one after the other that say so
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Seen:
+    """What the last pass saw. shift: None where the patches agree on none.  largest_px: how far any pixel moved."""
+
+    shift: Shift | None
+    largest_px: float
+    certain: bool
+
+
+class Background:
+    """Watch the room through one camera, a patch now and then.
+
+    camera: its picture's size.
+    """
+
+    def __init__(self, camera: Camera) -> None:
+        width, height = camera.width_px - 1, camera.height_px - 1
+        self._middle_px = np.array([width, height]) / 2.0
+        self._corners_px = np.array([[0, 0], [width, 0], [0, height], [width, height]]) - self._middle_px
+        self._patches: tuple[Patch, ...] | None = None
+        self._reach_px = NEAR_PX
+        self._moved: list[tuple[float, float] | None] = []
+        self._begun_ns = 0
+        self._pass_ns = PASS_NS
+        self._alarming = 0
+        self.newest: Seen | None = None
+        self.witness = Witness.LEARNING
+
+    @property
+    def shift(self) -> Shift | None:
+        """Return the picture's motion since the beginning as last seen, None where it is not known."""
+        return None if self.newest is None else self.newest.shift
+
+    def look(self, image: Image, t_ns: int, balls_px: Array, off_px: float) -> bool:
+        """Look up the patches that are due in an image taken at t_ns [ns]; say whether that ended a pass.
+
+        Args:
+            balls_px: (n, 2) where the balls are.  off_px: the vehicle reaches so far around them.
+        """
+        if self._patches is None:
+            self._patches = choose_patches(image, balls_px, off_px)
+            self._begin(t_ns)
+            if len(self._patches) < LEAST_PATCHES:
+                self.witness = Witness.BLIND
+            return True
+        if len(self._patches) < LEAST_PATCHES:
+            return False
+        if t_ns < self._begun_ns:
+            self._begin(t_ns)  # the clock was set back
+        due = (t_ns - self._begun_ns) * len(self._patches) / self._pass_ns
+        if len(self._moved) > due:
+            return False
+        self._moved.append(self._patches[len(self._moved)].moved_px(image, self._reach_px))
+        if len(self._moved) < len(self._patches):
+            return False
+        self._judge()
+        self._begin(t_ns)
+        return True
+
+    def _begin(self, t_ns: int) -> None:
+        self._moved.clear()
+        self._begun_ns = t_ns
+
+    def _judge(self) -> None:
+        """Draw the conclusion of a pass; look farther next time where most patches are not where they were."""
+        found = [(patch, moved) for patch, moved in zip(self._patches or (), self._moved, strict=True) if moved]
+        if 2 * len(found) <= len(self._moved):
+            self._reach_px = FAR_PX if self._reach_px == NEAR_PX else NEAR_PX
+        shift = None
+        if len(found) >= LEAST_PATCHES:
+            xy_px = np.array([(patch.u_px, patch.v_px) for patch, _ in found]) - self._middle_px
+            sigma_px = np.array([patch.sigma_px for patch, _ in found])
+            shift = find_shift(xy_px, np.array([moved for _, moved in found]), sigma_px)
+        self.newest = self._seen(shift)
+        self._alarming = self._alarming + 1 if self.newest.certain else 0
+        self._pass_ns = PASS_NS // 4 if 0 < self._alarming < PASSES else PASS_NS
+        self.witness = self._verdict(self.newest)
+
+    def _seen(self, shift: Shift | None) -> Seen:
+        if shift is None:
+            return Seen(None, 0.0, certain=False)
+        moved_px, sigma_px = shift.at(self._corners_px)
+        far_px = np.linalg.norm(moved_px, axis=1)
+        return Seen(shift, float(far_px.max()), certain=bool((far_px - SIGMAS * sigma_px > LIMIT_PX).any()))
+
+    def _verdict(self, seen: Seen) -> Witness:
+        if seen.shift is None:
+            return Witness.BLIND
+        if self._alarming >= PASSES:
+            return Witness.MOVED
+        return self.witness if seen.certain else Witness.STILL

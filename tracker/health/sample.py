@@ -1,0 +1,67 @@
+"""What the rays to the balls say of the cameras' stand at one instant.
+
+Source: with r the residuals of the sightings (whitened), J their slope by the vehicle's pose and D that by small motions
+    of the cameras, P = I - J (J'J)^-1 J' takes out what another pose would explain. What is left tells of the motions
+    c by r ~ D c: information N = D' P D (1), gradient g = D' P r (2).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from tracker.filter.measure import camera_table, marker_points, pixels
+from tracker.rig import Rig
+from tracker.state import State
+from tracker.types import Array, BallSighting
+
+MOTION = 6  # of a camera: its place in W [m], then its turn in W about itself [rad]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sample:
+    """One instant. N (6 cameras, 6 cameras) and g (6 cameras,), see (1) and (2)."""
+
+    N: Array
+    g: Array
+
+
+def take_sample(sightings: Sequence[BallSighting], state: State, rig: Rig, sigma_px: float) -> Sample | None:
+    """Hold sightings against a pose; None where fewer than two cameras see enough of the marker.
+
+    Args:
+        sightings: each at its own time, soon before or after the state's.
+        sigma_px: what a camera adds to the noise of its fits, one sigma [px].
+    """
+    cameras = np.array([sighting.camera for sighting in sightings])
+    if len(sightings) < 4 or len(set(cameras.tolist())) < 2:
+        return None
+    balls = np.array([sighting.ball for sighting in sightings])
+    lags_s = np.array([sighting.t_ns - state.t_ns for sighting in sightings]) * 1e-9
+    h, H = pixels(state.mean, state.manoeuvre_s, cameras, balls, lags_s, camera_table(rig), marker_points(rig))
+    if not np.isfinite(h).all():
+        return None
+    variances = [float(np.trace(one.cov_px)) / 2.0 + sigma_px**2 for one in sightings]
+    weight = np.repeat(1.0 / np.sqrt(variances), 2)
+    r = weight * (np.concatenate([sighting.uv_px for sighting in sightings]) - h)
+    J = weight[:, None] * H[:, :6]
+    D = weight[:, None] * _by_cameras(H[:, :3], cameras, state, rig)
+    basis = np.linalg.qr(J)[0]
+    D -= basis @ (basis.T @ D)
+    return Sample(D.T @ D, D.T @ r)
+
+
+def _by_cameras(J_px: Array, cameras: Array, state: State, rig: Rig) -> Array:
+    """Return d pixel / d motion of the cameras (2n, 6 cameras) of balls with d pixel / d place J_px (2n, 3).
+
+    Source: a camera that goes by t and turns by w about its place c sees the point X as if it had gone by
+        -t - w x (X - c); the marker's middle stands for its balls.
+    """
+    D = np.zeros((len(J_px), MOTION * len(rig.cameras)))
+    for row, camera in enumerate(np.repeat(cameras, 2).tolist()):
+        first = MOTION * camera
+        D[row, first : first + 3] = -J_px[row]
+        D[row, first + 3 : first + 6] = np.cross(J_px[row], state.p_BinW - rig.cameras[camera].p_CinW)
+    return D
