@@ -127,7 +127,7 @@ def test_json_schemas_stay_within_what_foxglove_reads(plain: McapReader) -> None
     summary = plain.get_summary()
     assert summary is not None
     schemas = [json.loads(one.data) for one in summary.schemas.values() if one.encoding == "jsonschema"]
-    assert len(schemas) == 6
+    assert len(schemas) == 7
     nodes = list(schemas)
     for node in nodes:
         assert node["type"] in {"object", "array", "string", "number", "integer"}

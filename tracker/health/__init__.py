@@ -1,1 +1,1 @@
-"""Whether the cameras still stand where they were calibrated: the room behind the vehicle, and the rays to its balls."""
+"""Whether the cameras still stand where they did: by the room behind the vehicle, and by the rays to its balls."""

@@ -74,7 +74,7 @@ class Agreement:
         Source: the motions c have a mean m and covariance Q, with or without a knock's own variance; the likelihood
             of a sample is exp(e' B (I + B' N B)^-1 B' e / 2) / sqrt(det(I + B' N B)), e = g - N m, B B' = Q.
         """
-        P = np.linalg.inv(self._N)
+        P = np.asarray(np.linalg.inv(self._N), dtype=np.float64)
         e = sample.g - sample.N @ (P @ self._g)
         Q = P + np.diag(_spread(self._cameras, DRIFT_M, DRIFT_RAD))
         without = _log_likelihood(e, sample.N, Q)

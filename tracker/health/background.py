@@ -18,9 +18,10 @@ from tracker.health.shift import LEAST_PATCHES, Shift, find_shift
 from tracker.health.values import Witness
 from tracker.types import Array, Image
 
-PASS_NS = 3_000_000_000  # in which each patch has its turn; after something has moved, in a quarter of it
-LIMIT_PX, SIGMAS = 0.3, 4.0  # a picture that has moved further beyond doubt is no longer that of the calibration
+PASS_NS, HURRIED_NS = 3_000_000_000, 750_000_000  # in which each patch has its turn; the second on suspicion
+LIMIT_PX, SIGMAS = 0.25, 4.0  # a picture that has moved further beyond doubt is no longer that of the calibration
 PASSES = 2  # one after the other that say so
+NOTHING_PX: Array = np.zeros((0, 2))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,11 +53,20 @@ class Background:
         self.witness = Witness.LEARNING
 
     @property
+    def chosen(self) -> bool:
+        """Say whether it is settled what to look for."""
+        return self._patches is not None
+
+    @property
     def shift(self) -> Shift | None:
         """Return the picture's motion since the beginning as last seen, None where it is not known."""
         return None if self.newest is None else self.newest.shift
 
-    def look(self, image: Image, t_ns: int, balls_px: Array, off_px: float) -> bool:
+    def hurry(self) -> None:
+        """End this pass sooner: something else speaks against the camera."""
+        self._pass_ns = HURRIED_NS
+
+    def look(self, image: Image, t_ns: int, balls_px: Array = NOTHING_PX, off_px: float = 0.0) -> bool:
         """Look up the patches that are due in an image taken at t_ns [ns]; say whether that ended a pass.
 
         Args:
@@ -98,7 +108,7 @@ class Background:
             shift = find_shift(xy_px, np.array([moved for _, moved in found]), sigma_px)
         self.newest = self._seen(shift)
         self._alarming = self._alarming + 1 if self.newest.certain else 0
-        self._pass_ns = PASS_NS // 4 if 0 < self._alarming < PASSES else PASS_NS
+        self._pass_ns = HURRIED_NS if 0 < self._alarming < PASSES else PASS_NS
         self.witness = self._verdict(self.newest)
 
     def _seen(self, shift: Shift | None) -> Seen:

@@ -54,7 +54,7 @@ class Patch:
         """Return how far the search may go without leaving the image."""
         height, width = image.shape[:2]
         room = min(self.u_px, self.v_px, width - 1 - self.u_px, height - 1 - self.v_px)
-        return min(reach_px, room - HALF_PX)
+        return min(reach_px, int(room) - HALF_PX)
 
 
 def choose_patches(image: Image, keep_off_px: Array, off_px: float) -> tuple[Patch, ...]:

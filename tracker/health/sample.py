@@ -1,8 +1,8 @@
 """What the rays to the balls say of the cameras' stand at one instant.
 
-Source: with r the residuals of the sightings (whitened), J their slope by the vehicle's pose and D that by small motions
-    of the cameras, P = I - J (J'J)^-1 J' takes out what another pose would explain. What is left tells of the motions
-    c by r ~ D c: information N = D' P D (1), gradient g = D' P r (2).
+Source: with r the residuals of the sightings (whitened), J their slope by the vehicle's pose and D that by small
+    motions of the cameras, P = I - J (J'J)^-1 J' takes out what another pose would explain. What is left tells of the
+    motions c by r ~ D c: information N = D' P D (1), gradient g = D' P r (2).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tracker.filter.measure import camera_table, marker_points, pixels
+from tracker.filter.measure import Indices, camera_table, marker_points, pixels
 from tracker.rig import Rig
 from tracker.state import State
 from tracker.types import Array, BallSighting
@@ -53,7 +53,7 @@ def take_sample(sightings: Sequence[BallSighting], state: State, rig: Rig, sigma
     return Sample(D.T @ D, D.T @ r)
 
 
-def _by_cameras(J_px: Array, cameras: Array, state: State, rig: Rig) -> Array:
+def _by_cameras(J_px: Array, cameras: Indices, state: State, rig: Rig) -> Array:
     """Return d pixel / d motion of the cameras (2n, 6 cameras) of balls with d pixel / d place J_px (2n, 3).
 
     Source: a camera that goes by t and turns by w about its place c sees the point X as if it had gone by

@@ -24,6 +24,7 @@ class CameraHealth:
     camera sees [mm].  Both 0 where not known.
     """
 
+    name: str
     moved: bool
     witness: Witness
     shift_px: float = 0.0
@@ -46,3 +47,11 @@ class Health:
     at_odds: bool = False
     epipolar_px: float | None = None
     spacing_mm: float | None = None
+
+    @property
+    def brief(self) -> str:
+        """What is wrong in a few words, "" for nothing."""
+        moved = [camera.name for camera in self.cameras if camera.moved]
+        if moved:
+            return f"{' '.join(moved)} moved, poses poor: land"
+        return "a camera moved, poses poor: land" if self.at_odds else ""

@@ -35,6 +35,10 @@ class Eyes:
         self._turn = 0
         self._taught_blindly = False
 
+    def stand(self, rig: Rig) -> None:
+        """Take the cameras to stand elsewhere."""
+        self._rig = rig
+
     @property
     def lessons_due(self) -> int:
         """Return how often the first images should be gone over again, since nothing else is known yet."""
