@@ -1,6 +1,6 @@
 """Whether the rays of all cameras still meet as they did, and if not, whose do not.
 
-    a sample a second -> against what the samples before tell of the calibration's own faults -> evidence, by camera
+    a sample now and then -> held against what those before tell of the calibration's own faults -> evidence by camera
 
 Each sample is weighed alone and none counts beyond a limit, so a hand or a false ball in one of them is no alarm.
 """
@@ -16,14 +16,14 @@ import numpy as np
 from tracker.health.sample import MOTION, Sample
 from tracker.types import Array
 
-RECENT = 4  # samples that are judged together
-FIRST = 6  # older ones that it takes to know the calibration's own faults
+RECENT = 3  # samples that are judged together
+FIRST = 3  # older ones that it takes to know the calibration's own faults
 FADING = 0.98  # of the older ones, with each that joins them
 CALIBRATED_M, CALIBRATED_RAD = 0.003, math.radians(0.1)  # one sigma: what a calibration leaves
 DRIFT_M, DRIFT_RAD = 0.0003, math.radians(0.02)  # one sigma: what comes and goes with light, lens and place
 KNOCK_M, KNOCK_RAD = 0.01, math.radians(0.5)  # one sigma of a camera that was knocked
 MOST_EVIDENCE = 25.0  # of one sample [nats]
-AT_ODDS = 60.0  # of all recent ones: three of them at least [nats]
+AT_ODDS = 50.0  # of all recent ones: more than two can give [nats]
 NAMED = 15.0  # by which it must be better than that against any other camera [nats]
 
 

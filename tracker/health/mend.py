@@ -22,6 +22,6 @@ def turned(camera: Camera, shift: Shift) -> Camera:
     """
     width, height = camera.width_px - 1, camera.height_px - 1
     corners_px = np.array([[0.0, 0.0], [width, 0.0], [0.0, height], [width, height]])
-    moved_px, _ = shift.at(corners_px - np.array([width, height]) / 2.0)
+    moved_px = shift.at(corners_px - np.array([width, height]) / 2.0)
     turn, _ = Rotation.align_vectors(camera.bearings(corners_px), camera.bearings(corners_px + moved_px))
     return replace(camera, R_CtoW=frozen_array(camera.R_CtoW @ turn.as_matrix()))

@@ -28,7 +28,31 @@ class Sample:
     g: Array
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Linear:
+    """Sightings held against a pose, whitened by their noise.
+
+    r (2n,): residuals.  J (2n, 6), D (2n, 6 cameras): their slopes by the pose's error and by motions of the cameras.
+    weight (2n,): one over each one's sigma [1/px].
+    """
+
+    r: Array
+    J: Array
+    D: Array
+    weight: Array
+
+
 def take_sample(sightings: Sequence[BallSighting], state: State, rig: Rig, sigma_px: float) -> Sample | None:
+    """Hold sightings against a pose and take out what another pose would explain; None as `linearised` gives it."""
+    one = linearised(sightings, state, rig, sigma_px)
+    if one is None:
+        return None
+    basis = np.linalg.qr(one.J)[0]
+    D = one.D - basis @ (basis.T @ one.D)
+    return Sample(D.T @ D, D.T @ one.r)
+
+
+def linearised(sightings: Sequence[BallSighting], state: State, rig: Rig, sigma_px: float) -> Linear | None:
     """Hold sightings against a pose; None where fewer than two cameras see enough of the marker.
 
     Args:
@@ -43,14 +67,11 @@ def take_sample(sightings: Sequence[BallSighting], state: State, rig: Rig, sigma
     h, H = pixels(state.mean, state.manoeuvre_s, cameras, balls, lags_s, camera_table(rig), marker_points(rig))
     if not np.isfinite(h).all():
         return None
-    variances = [float(np.trace(one.cov_px)) / 2.0 + sigma_px**2 for one in sightings]
+    variances = np.array([one.cov_px for one in sightings]).trace(axis1=1, axis2=2) / 2.0 + sigma_px**2
     weight = np.repeat(1.0 / np.sqrt(variances), 2)
     r = weight * (np.concatenate([sighting.uv_px for sighting in sightings]) - h)
-    J = weight[:, None] * H[:, :6]
     D = weight[:, None] * _by_cameras(H[:, :3], cameras, state, rig)
-    basis = np.linalg.qr(J)[0]
-    D -= basis @ (basis.T @ D)
-    return Sample(D.T @ D, D.T @ r)
+    return Linear(r, weight[:, None] * H[:, :6], D, weight)
 
 
 def _by_cameras(J_px: Array, cameras: Indices, state: State, rig: Rig) -> Array:
@@ -59,9 +80,9 @@ def _by_cameras(J_px: Array, cameras: Indices, state: State, rig: Rig) -> Array:
     Source: a camera that goes by t and turns by w about its place c sees the point X as if it had gone by
         -t - w x (X - c); the marker's middle stands for its balls.
     """
-    D = np.zeros((len(J_px), MOTION * len(rig.cameras)))
-    for row, camera in enumerate(np.repeat(cameras, 2).tolist()):
-        first = MOTION * camera
-        D[row, first : first + 3] = -J_px[row]
-        D[row, first + 3 : first + 6] = np.cross(J_px[row], state.p_BinW - rig.cameras[camera].p_CinW)
-    return D
+    D = np.zeros((len(J_px), len(rig.cameras), MOTION))
+    rows, of = np.arange(len(J_px)), np.repeat(cameras, 2)
+    arms = state.p_BinW - np.array([camera.p_CinW for camera in rig.cameras])
+    D[rows, of, :3] = -J_px
+    D[rows, of, 3:] = np.cross(J_px, arms[of])
+    return D.reshape(len(J_px), -1)

@@ -11,9 +11,10 @@ from tracker.types import Array
 LEAST_PATCHES = 4
 AGREE_PX = 0.5  # a patch that moves otherwise than the picture: something before it, or moved itself
 FAR_OFF_PX = 4.0  # from the median, before turn and zoom are known
-STEPS = 4
+STEPS = 3
 TURN_SIGMA, ZOOM_SIGMA = 0.01, 0.01  # of what a knock may do, so that few patches in a corner do not tell fables
 SHIFT_SIGMA_PX = 100.0
+PRIOR = np.diag(1.0 / np.array([SHIFT_SIGMA_PX, SHIFT_SIGMA_PX, TURN_SIGMA, ZOOM_SIGMA]) ** 2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,11 +30,16 @@ class Shift:
     covariance: Array
     patches: int
 
-    def at(self, xy_px: Array) -> tuple[Array, Array]:
-        """Return how far points (n, 2) from the middle have moved (n, 2), and one sigma of that (n,) [px]."""
+    def at(self, xy_px: Array) -> Array:
+        """Return how far points (n, 2) from the middle have moved (n, 2) [px]."""
+        u, v, turn, zoom = self.motion.tolist()
+        x, y = xy_px.T
+        return np.stack((u + zoom * x - turn * y, v + turn * x + zoom * y), axis=1)
+
+    def sigmas_at(self, xy_px: Array) -> Array:
+        """Return one sigma (n,) of that [px]."""
         slopes = _slopes(xy_px)
-        variances = np.einsum("nij,jk,nik->ni", slopes, self.covariance, slopes).max(axis=1)
-        return slopes @ self.motion, np.sqrt(variances)
+        return np.asarray(np.sqrt(((slopes @ self.covariance) * slopes).sum(axis=1).reshape(-1, 2).max(axis=1)))
 
 
 def find_shift(xy_px: Array, moved_px: Array, sigma_px: Array) -> Shift | None:
@@ -50,20 +56,24 @@ def find_shift(xy_px: Array, moved_px: Array, sigma_px: Array) -> Shift | None:
     slopes, weight = _slopes(xy_px), 1.0 / sigma_px**2
     rest_px = moved_px - np.median(moved_px, axis=0)
     for step in range(STEPS):
-        agree = np.linalg.norm(rest_px, axis=1) <= (FAR_OFF_PX if step == 0 else AGREE_PX + 3.0 * sigma_px)
-        if agree.sum() < LEAST_PATCHES or 2 * agree.sum() <= len(xy_px):
+        off_px = np.hypot(rest_px[:, 0], rest_px[:, 1])
+        agree = off_px <= (FAR_OFF_PX if step == 0 else AGREE_PX + 3.0 * sigma_px)
+        count = int(agree.sum())
+        if count < LEAST_PATCHES or 2 * count <= len(xy_px):
             return None
-        A, w = slopes[agree], weight[agree]
-        prior = np.diag(1.0 / np.array([SHIFT_SIGMA_PX, SHIFT_SIGMA_PX, TURN_SIGMA, ZOOM_SIGMA]) ** 2)
-        covariance = np.linalg.inv(np.einsum("n,nij,nik->jk", w, A, A) + prior)
-        motion = covariance @ np.einsum("n,nij,ni->j", w, A, moved_px[agree])
-        rest_px = moved_px - slopes @ motion
-    excess = max(1.0, float((w * (rest_px[agree] ** 2).sum(axis=1)).sum()) / (2 * len(w) - len(motion)))
-    return Shift(motion, covariance * excess, len(w))
+        w = np.repeat(np.where(agree, weight, 0.0), 2)
+        weighed = slopes * w[:, None]
+        covariance = np.linalg.inv(weighed.T @ slopes + PRIOR)
+        motion = covariance @ (weighed.T @ moved_px.reshape(-1))
+        rest_px = moved_px - (slopes @ motion).reshape(-1, 2)
+    excess = max(1.0, float(w @ rest_px.reshape(-1) ** 2) / (2 * count - len(motion)))
+    return Shift(motion, covariance * excess, count)
 
 
 def _slopes(xy_px: Array) -> Array:
-    """Return d moved / d motion (n, 2, 4)."""
+    """Return d moved / d motion (2n, 4), u and v of each point in turn."""
+    slopes = np.zeros((2 * len(xy_px), 4))
     x, y = xy_px.T
-    one, zero = np.ones_like(x), np.zeros_like(x)
-    return np.stack((np.stack((one, zero, -y, x), axis=1), np.stack((zero, one, x, y), axis=1)), axis=1)
+    slopes[::2, 0], slopes[::2, 2], slopes[::2, 3] = 1.0, -y, x
+    slopes[1::2, 1], slopes[1::2, 2], slopes[1::2, 3] = 1.0, x, y
+    return slopes

@@ -1,7 +1,7 @@
 """The watch over the calibration while flying.
 
 each round: a few patches of the room in each camera -> Background
-once a second: the newest sightings of all cameras -> Agreement (evidence), residuals (figures)
+every other second: the newest sightings of all cameras -> Agreement (evidence), residuals (figures)
 -> Health, whenever one of them has something to say
 """
 
@@ -16,7 +16,7 @@ import numpy as np
 from tracker.camera import Camera
 from tracker.filter.measure import predicted_pixels
 from tracker.health.agreement import Agreement, Odds
-from tracker.health.background import Background
+from tracker.health.background import NEVER_NS, Background
 from tracker.health.mend import turned
 from tracker.health.rays import residuals
 from tracker.health.sample import take_sample
@@ -25,9 +25,9 @@ from tracker.rig import Rig
 from tracker.state import State
 from tracker.types import BallSighting, Frame
 
-SAMPLE_NS = 1_000_000_000
+SAMPLE_NS = 2_000_000_000
 TOGETHER_NS = 70_000_000  # sightings of different cameras this close are held against one state
-FIGURES = 10  # samples that the figures are of
+FIGURES = 5  # samples that the figures are of
 REACH = 1.5  # of the marker's size: how far rotor and boom reach round the balls
 NOBODY = Odds(at_odds=False, suspect=None)
 
@@ -45,7 +45,8 @@ class CalibrationWatch:
         self._agreement = Agreement(len(rig.cameras))
         self._odds = NOBODY
         self._newest: dict[int, list[BallSighting]] = {}
-        self._sampled_ns: int | None = None
+        self._sampled_ns = self._due_ns = -NEVER_NS
+        self._taken_ns = NEVER_NS
         self._figures: deque[tuple[list[float], list[float]]] = deque(maxlen=FIGURES)
         self._size_m = float(np.linalg.norm(rig.marker.points_inB, axis=1).max())
 
@@ -65,11 +66,15 @@ class CalibrationWatch:
         Returns:
             How the calibration stands, where the round told something new of it.
         """
+        if not refused and self._taken_ns <= t_ns < self._due_ns:
+            return None
+        self._taken_ns = t_ns
         for camera in {one.camera for one in refused}:
             self._backgrounds[camera].hurry()
         looked = [self._look(frame, state) for frame in frames]
         self._remember(used, refused)
         sampled = state is not None and self._sample(state, t_ns)
+        self._due_ns = min(self._sampled_ns + SAMPLE_NS - TOGETHER_NS, *(each.due_ns for each in self._backgrounds))
         return self.health(state, t_ns) if any(looked) or sampled else None
 
     def health(self, state: State | None, t_ns: int) -> Health:
@@ -104,7 +109,7 @@ class CalibrationWatch:
 
     def _sample(self, state: State, t_ns: int) -> bool:
         """Hold the newest sightings against each other, if it is time; say whether that was done."""
-        if self._sampled_ns is not None and 0 <= t_ns - self._sampled_ns < SAMPLE_NS:
+        if 0 <= t_ns - self._sampled_ns < SAMPLE_NS:
             return False
         near = [one for seen in self._newest.values() for one in seen if abs(one.t_ns - t_ns) <= TOGETHER_NS]
         sample = take_sample(near, state, self._rig, self._sigma_px)
