@@ -130,7 +130,7 @@ def test_json_schemas_stay_within_what_foxglove_reads(plain: McapReader) -> None
     assert len(schemas) == 7
     nodes = list(schemas)
     for node in nodes:
-        assert node["type"] in {"object", "array", "string", "number", "integer"}
+        assert node["type"] in {"object", "array", "string", "number", "integer", "boolean"}
         nodes += node["properties"].values() if node["type"] == "object" else []
         nodes += [node["items"]] if node["type"] == "array" else []
 

@@ -70,19 +70,20 @@ def linearised(sightings: Sequence[BallSighting], state: State, rig: Rig, sigma_
     variances = np.array([one.cov_px for one in sightings]).trace(axis1=1, axis2=2) / 2.0 + sigma_px**2
     weight = np.repeat(1.0 / np.sqrt(variances), 2)
     r = weight * (np.concatenate([sighting.uv_px for sighting in sightings]) - h)
-    D = weight[:, None] * _by_cameras(H[:, :3], cameras, state, rig)
+    D = weight[:, None] * _by_cameras(H[:, :3], cameras, balls, state, rig)
     return Linear(r, weight[:, None] * H[:, :6], D, weight)
 
 
-def _by_cameras(J_px: Array, cameras: Indices, state: State, rig: Rig) -> Array:
+def _by_cameras(J_px: Array, cameras: Indices, balls: Indices, state: State, rig: Rig) -> Array:
     """Return d pixel / d motion of the cameras (2n, 6 cameras) of balls with d pixel / d place J_px (2n, 3).
 
     Source: a camera that goes by t and turns by w about its place c sees the point X as if it had gone by
-        -t - w x (X - c); the marker's middle stands for its balls.
+        -t - w x (X - c).
     """
     D = np.zeros((len(J_px), len(rig.cameras), MOTION))
     rows, of = np.arange(len(J_px)), np.repeat(cameras, 2)
-    arms = state.p_BinW - np.array([camera.p_CinW for camera in rig.cameras])
+    balls_inW = state.p_BinW + marker_points(rig)[balls] @ state.R_BtoW.T
+    arms = balls_inW - np.array([camera.p_CinW for camera in rig.cameras])[cameras]
     D[rows, of, :3] = -J_px
-    D[rows, of, 3:] = np.cross(J_px, arms[of])
+    D[rows, of, 3:] = np.cross(J_px, np.repeat(arms, 2, axis=0))
     return D.reshape(len(J_px), -1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +11,7 @@ from tracker.types import Array
 
 LEAST_PATCHES = 4
 AGREE_PX = 0.5  # a patch that moves otherwise than the picture: something before it, or moved itself
+BEND = 0.05  # of a far motion: perspective, which turn and zoom do not make
 FAR_OFF_PX = 4.0  # from the median, before turn and zoom are known
 STEPS = 3
 TURN_SIGMA, ZOOM_SIGMA = 0.01, 0.01  # of what a knock may do, so that few patches in a corner do not tell fables
@@ -54,10 +56,12 @@ def find_shift(xy_px: Array, moved_px: Array, sigma_px: Array) -> Shift | None:
     if len(xy_px) < LEAST_PATCHES:
         return None
     slopes, weight = _slopes(xy_px), 1.0 / sigma_px**2
-    rest_px = moved_px - np.median(moved_px, axis=0)
+    middle_px = np.median(moved_px, axis=0)
+    rest_px = moved_px - middle_px
+    enough_px = AGREE_PX + BEND * math.hypot(*middle_px.tolist()) + 3.0 * sigma_px
     for step in range(STEPS):
         off_px = np.hypot(rest_px[:, 0], rest_px[:, 1])
-        agree = off_px <= (FAR_OFF_PX if step == 0 else AGREE_PX + 3.0 * sigma_px)
+        agree = off_px <= (FAR_OFF_PX if step == 0 else enough_px)
         count = int(agree.sum())
         if count < LEAST_PATCHES or 2 * count <= len(xy_px):
             return None
