@@ -50,11 +50,11 @@ class Bump:
 
 @dataclass(frozen=True, eq=False)
 class Told:
-    """Every event's time and camera, its step, and the poses held against the truth."""
+    """Every event, its step, and the poses held against the truth, None where there is none."""
 
     events: list[Event]
     steps: list[Step]
-    flown: Flown
+    flown: Flown | None
 
     def health(self) -> list[tuple[float, Health]]:
         """Return what was said of the calibration, by seconds since the start."""

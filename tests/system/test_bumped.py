@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import json
+import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tests.system.bumps import BUMP_S, DURATION_S, WITHIN_S, Bump, flown, log_of
+from bridge.settings import rig_of
+from tests.system.bumps import BUMP_S, CLOCKS, DURATION_S, SETTINGS, WITHIN_S, Bump, Told, flown, log_of
 from tools.calibrate.formats.own import read_own
 from tools.calibrate.refine.session import RefineRequest, run_refine
+from tools.session import tracker_of
 from tracker.camera import Camera
 from tracker.errors import OperatorError
 from tracker.scene import Knock, Occluder, Trouble
-from tracker.scene.knock import knocked
+from tracker.scene.knock import knocked, seen_from
+from tracker.sources.recording import RecordingSource
 from tracker.sources.sim import START_NS
+from tracker.types import Event, Frame, Step
+
+PERIOD_NS = 66_666_667
 
 TURNED = Bump(Knock(1, turn_deg=(0.2, 0.0, 0.0)))
 ASIDE = Bump(Knock(0, shift_mm=(5.0, 0.0, 0.0)), seed=2)
@@ -69,7 +77,9 @@ def test_a_bumped_camera_is_named_within_ten_seconds_and_no_other(bump: Bump) ->
 @pytest.mark.parametrize("bump", BUMPS, ids=lambda bump: f"{bump.cameras}-{bump.knock}")
 def test_once_it_is_named_no_pose_is_wrong(bump: Bump) -> None:
     named_s = next(iter(flown(bump).named().values()))
-    after = flown(bump).flown.between(named_s + 0.2, np.inf)
+    poses = flown(bump).flown
+    assert poses is not None
+    after = poses.between(named_s + 0.2, np.inf)
     assert len(after) > 0.9 * 15.0 * (DURATION_S - named_s - 0.2)
     assert after.wrong() == {}
 
@@ -104,3 +114,39 @@ def test_a_log_in_which_nothing_moved_says_so(tmp_path: Path) -> None:
         run_refine(RefineRequest(log, ("left",), None, overwrite=False, as_json=False))
     with pytest.raises(OperatorError, match="none is left to hold the room"):
         run_refine(RefineRequest(log, ("cam0", "cam1"), None, overwrite=False, as_json=False))
+
+
+def laps(recording: Path, knock: Knock | None) -> Told:
+    """Track a recording over and over for DURATION_S, one camera's pictures taken from elsewhere after BUMP_S."""
+    with RecordingSource(recording, lambda: 0) as source:
+        frames, cameras = [event for event in source if isinstance(event, Frame)], source.cameras or ()
+    rig = rig_of(SETTINGS, cameras, len(cameras)).rig
+    events: list[Event] = []
+    steps: list[Step] = []
+    tracker, first_ns, lap_ns = tracker_of(SETTINGS, rig, CLOCKS), frames[0].t_ns, frames[-1].t_ns - frames[0].t_ns
+    for lap in range(math.ceil(DURATION_S * 1e9 / lap_ns)):
+        for frame in frames:
+            now = replace(frame, t_ns=frame.t_ns + lap * (lap_ns + PERIOD_NS) - first_ns + START_NS)
+            if knock is not None and frame.camera == knock.camera and now.t_ns - START_NS >= BUMP_S * 1e9:
+                elsewhere = knocked(cameras[frame.camera], knock)
+                picture = seen_from(frame.image.astype(np.float32), cameras[frame.camera], elsewhere)
+                now = replace(now, image=np.rint(picture).clip(0, 255).astype(np.uint8))
+            events.append(now)
+            steps.append(tracker.step(now))
+    return Told(events, steps, None)
+
+
+@pytest.mark.parametrize("name", ["lab_flight", "lab_protocol"])
+def test_the_recordings_raise_no_alarm(name: str, request: pytest.FixtureRequest) -> None:
+    health = [each for _, each in laps(request.getfixturevalue(name), None).health()]
+    assert len(health) > 4
+    assert {each.brief for each in health} == {""}
+
+
+@pytest.mark.parametrize("camera", [0, 1])
+def test_in_real_pictures_a_turned_camera_is_named_before_a_bare_wall_and_before_a_full_one(
+    lab_flight: Path, camera: int
+) -> None:
+    named = laps(lab_flight, Knock(camera, turn_deg=(0.2, 0.0, 0.0))).named()
+    assert list(named) == [f"cam{camera}"]
+    assert BUMP_S < named[f"cam{camera}"] <= BUMP_S + WITHIN_S

@@ -22,8 +22,8 @@ FADING = 0.98  # of the older ones, with each that joins them
 CALIBRATED_M, CALIBRATED_RAD = 0.003, math.radians(0.1)  # one sigma: what a calibration leaves
 DRIFT_M, DRIFT_RAD = 0.0003, math.radians(0.01)  # one sigma: what comes and goes with light, lens and place
 KNOCK_M, KNOCK_RAD = 0.01, math.radians(0.5)  # one sigma of a camera that was knocked
-MOST_EVIDENCE = 25.0  # of one sample [nats]
-AT_ODDS = 50.0  # of all recent ones: more than two can give [nats]
+MOST_EVIDENCE = 7.4  # of one sample [nats]
+AT_ODDS = 15.0  # of all recent ones: more than two can give [nats]
 NAMED = 15.0  # by which it must be better than that against any other camera [nats]
 
 

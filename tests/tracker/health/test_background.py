@@ -50,7 +50,7 @@ def test_a_room_that_stands_still_is_seen_to_do_so_to_a_tenth_of_a_pixel(still: 
     assert still.newest.largest_px < 0.1
 
 
-@pytest.mark.parametrize("degrees", [(0.1, 0.0, 0.0), (0.0, -0.2, 0.0), (0.0, 0.0, 0.2), (0.5, 0.3, 0.0)])
+@pytest.mark.parametrize("degrees", [(0.1, 0.0, 0.0), (0.0, -0.2, 0.0), (0.0, 0.0, 0.2), (0.4, 0.2, 0.0)])
 def test_a_turned_camera_is_turned_back_to_where_it_looks(degrees: tuple[float, float, float]) -> None:
     room, knock = Room(), Knock(0, turn_deg=degrees)
     room.seen()
