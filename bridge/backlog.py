@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 from bridge.log.entry import Entry
 
-BATCH = 8  # steps; waking a thread costs as much as writing one of them, and eight are written in half a millisecond
+BATCH = 64  # steps: a turn of the writing thread empties the caches of the loop, and costs it more than it writes
 PATIENCE_S = 0.25
 
 
@@ -20,7 +20,7 @@ class Backlog:
 
     def __init__(self, capacity: int) -> None:
         self._capacity = capacity
-        self._batch = min(BATCH, capacity)
+        self._batch = max(1, min(BATCH, capacity // 2))  # the loop goes on filling it meanwhile
         self._waiting: deque[Entry] = deque()
         self._wake = threading.Event()
         self._room = threading.Event()

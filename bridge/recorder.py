@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -62,7 +62,8 @@ class Recorder:
         metadata: names and values by topic, such as versions, source URI and command line.
         cameras, marker: as tracked with, drawn into the log.
         wall_clock: reads the wall clock [ns since 1970]; noted once a second beside stream time.
-        tlog: a new file for the MAVLink frames alone, None for none.
+        tlog: a new file for the MAVLink frames alone, numbered ones where there are several links; None for none.
+        links: their names, in the order of those numbers.
         overwrite: replace files that exist.
         block_when_full: wait for the disk instead of dropping, for input that is not live.
         capacity: steps the queue holds; 1024 are some 17 s of two cameras at 30 Hz.
@@ -81,6 +82,7 @@ class Recorder:
         marker: Marker,
         wall_clock: Callable[[], int],
         tlog: Path | None = None,
+        links: Sequence[str] = (),
         overwrite: bool = False,
         block_when_full: bool = False,
         capacity: int = CAPACITY,
@@ -90,7 +92,7 @@ class Recorder:
         self._wall_clock = wall_clock
         self._block = block_when_full
         self._stream = open_stream(path, overwrite)
-        self._tlog = self._open_tlog(tlog, overwrite)
+        self._tlog = self._open_tlog(tlog, links, overwrite)
         self._film = None if film is None else Film(film)
         if film is not None:
             metadata = {**metadata, FILM_METADATA: {"format": film.format.value}}
@@ -161,9 +163,9 @@ class Recorder:
             self._backlog.wait_for_room(STALL_S)
         return True
 
-    def _open_tlog(self, path: Path | None, overwrite: bool) -> TlogWriter | None:
+    def _open_tlog(self, path: Path | None, links: Sequence[str], overwrite: bool) -> TlogWriter | None:
         try:
-            return None if path is None else TlogWriter(path, overwrite)
+            return None if path is None else TlogWriter(path, overwrite, links)
         except OperatorError:
             self._stream.close()
             if not overwrite and self._path.is_file():  # begun a moment ago, with nothing in it

@@ -141,6 +141,7 @@ def recorder_of(
         marker=rig.marker,
         wall_clock=clocks.wall,
         tlog=tlog_beside(path),
+        links=tuple(link.uri for link in settings.links),
         film=film_of(settings),
         **how,
     )

@@ -24,6 +24,8 @@ class Camera:
     distortion: (4,), (5,) or (8,) OpenCV order k1 k2 p1 p2 [k3 [k4 k5 k6]].
     R_CtoW: (3, 3), p_CinW: (3,) the camera's pose in the room [m].
     clock_offset_ns: known time by which it sees later than its stamps say [ns].
+    readout_ns: how much later its last row is exposed than its first [ns]: a rolling shutter's; 0 for a global one,
+        negative where the picture is read from below. A frame's stamp is that of the row in the middle.
     Build it with `make_camera`, which checks the values.
     """
 
@@ -35,6 +37,7 @@ class Camera:
     R_CtoW: Array
     p_CinW: Array
     clock_offset_ns: int = 0
+    readout_ns: int = 0
 
     def in_camera(self, p_inW: Array) -> Array:
         """Turn room points (n, 3) into camera coordinates (n, 3) [m]."""
@@ -73,6 +76,15 @@ class Camera:
         """Say whether a pixel (2,) lies inside the image by at least `margin_px`."""
         u, v = float(uv_px[0]), float(uv_px[1])
         return margin_px <= u <= self.width_px - 1 - margin_px and margin_px <= v <= self.height_px - 1 - margin_px
+
+    @property
+    def row_ns(self) -> float:
+        """How much later each row is exposed than the one above it [ns]."""
+        return self.readout_ns / max(self.height_px - 1, 1)
+
+    def delay_ns(self, v_px: float) -> float:
+        """Return how much later than the middle row, and so than the frame's stamp, a row is exposed [ns]."""
+        return (v_px - (self.height_px - 1) / 2.0) * self.row_ns
 
     @property
     def focal_px(self) -> float:

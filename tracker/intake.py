@@ -8,7 +8,7 @@ from tracker.rig import Rig
 from tracker.types import Frame, Image, Reason, Rejected
 
 LEAP_NS = 1_000_000_000
-GLANCE_ROWS, GLANCE_COLUMNS = 37, 41  # one pixel in so many is compared at first
+GLANCE_ROWS, GLANCE_COLUMNS = 97, 89  # one pixel in so many is compared at first
 
 
 class Intake:

@@ -95,13 +95,16 @@ class State:
 
     @property
     def mean(self) -> Array:
-        """Return the nominal state as one vector, for compiled code: p, R by rows, v, w, a, alpha, offsets."""
-        return np.concatenate(
-            (
-                self.p_BinW, self.R_BtoW.reshape(9), self.v_BinW, self.w_BinB, self.a_BinW, self.alpha_BinB,
-                self.offsets_s,
-            )
+        """Return the nominal state as one vector, for compiled code: p, R by rows, v, w, a, alpha, offsets.
+
+        Only to be read: it is the vector that `at_mean` was given, if the state's parts are still parts of that.
+        """
+        whole, parts = self.p_BinW.base, (
+            self.p_BinW, self.R_BtoW, self.v_BinW, self.w_BinB, self.a_BinW, self.alpha_BinB, self.offsets_s
         )  # fmt: skip
+        if whole is not None and all(part.base is whole for part in parts):
+            return whole
+        return np.concatenate([part.reshape(-1) for part in parts])
 
     def with_mean(self, mean: Array) -> State:
         """Return the state with another nominal state, as `mean` gives it."""

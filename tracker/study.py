@@ -62,7 +62,7 @@ class Study:
     def _see(self, frames: Round, ahead: Prediction, harvest: Harvest, last: State | None) -> Update | None:
         """Look where a predicted state expects the balls and update it, or return None."""
         found, look = self._glance(frames, ahead, ahead.state, harvest, last)
-        if isinstance(found, Update) and last is not None and self._eyes.blind(ahead.state):
+        if isinstance(found, Update) and last is not None and look.blind:
             # Only now is known how fast the balls move, and so how their images are smeared: look again.
             again, sharper = self._glance(frames, ahead, found.state, harvest, last)
             found, look = (again, sharper) if isinstance(again, Update) else (found, look)
@@ -75,9 +75,11 @@ class Study:
         harvest.sightings += found.used
         harvest.rejections += found.rejected
         blindly = self._eyes.blind(found.state)
-        used = {(sighting.camera, sighting.ball) for sighting in found.used}
-        fitted = [one for one in look.fitted if (one.sighting.camera, one.sighting.ball) in used]
-        harvest.refused += [one for one in seen if (one.camera, one.ball) not in used]
+        fitted = look.fitted
+        if len(found.used) < len(fitted):
+            used = {(sighting.camera, sighting.ball) for sighting in found.used}
+            fitted = [one for one in fitted if (one.sighting.camera, one.sighting.ball) in used]
+            harvest.refused += [one for one in seen if (one.camera, one.ball) not in used]
         self._eyes.learn(fitted, blindly=blindly)
         return found
 

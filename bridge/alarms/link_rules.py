@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from bridge.alarms.readings import Readings
-from bridge.alarms.rule import Finding, Level, Rule, when
+from bridge.alarms.rule import Finding, Level, Rule, Verdict
 from bridge.dialogue import DialogueState
 
 HEARD_S = 10.0
@@ -14,12 +14,13 @@ SYNC_S = 15.0
 
 def _link_down(now: Readings) -> Iterator[Finding]:
     for link in now.around.links:
-        yield Finding(
-            link.name,
-            when(not link.up),
-            f"link {link.name} is down: {link.reason}",
-            "check that the autopilot has power, the cable, port and baud; it is tried again by itself",
-        )
+        if not link.up:
+            yield Finding(
+                link.name,
+                Verdict.BAD,
+                f"link {link.name} is down: {link.reason}",
+                "check that the autopilot has power, the cable, port and baud; it is tried again by itself",
+            )
 
 
 def _far_ends(now: Readings) -> Iterator[tuple[str, DialogueState]]:
@@ -30,62 +31,68 @@ def _far_ends(now: Readings) -> Iterator[tuple[str, DialogueState]]:
 
 def _link_full(now: Readings) -> Iterator[Finding]:
     for link, far in _far_ends(now):
-        yield Finding(
-            link,
-            when(far.full),
-            f"link {link} is full: poses go at the rate that fits, the newest first, whole messages only",
-            "raise the baud here and at the autopilot, or send fewer messages (`messages` in [[links]])",
-        )
+        if far.full:
+            yield Finding(
+                link,
+                Verdict.BAD,
+                f"link {link} is full: poses go at the rate that fits, the newest first, whole messages only",
+                "raise the baud here and at the autopilot, or send fewer messages (`messages` in [[links]])",
+            )
 
 
 def _autopilot_silent(now: Readings) -> Iterator[Finding]:
     for link, far in _far_ends(now):
-        yield Finding(
-            link,
-            when(far.away),
-            f"the autopilot on {link} has fallen silent",
-            "check its power and the wire back from it; it is taken back by itself",
-        )
+        if far.away:
+            yield Finding(
+                link,
+                Verdict.BAD,
+                f"the autopilot on {link} has fallen silent",
+                "check its power and the wire back from it; it is taken back by itself",
+            )
 
 
 def _yaw_wrong(now: Readings) -> Iterator[Finding]:
     for link, far in _far_ends(now):
-        yield Finding(
-            link,
-            when(bool(far.yaw)),
-            far.yaw,
-            "take over by hand and land; then see marker and room_yaw_deg by `posebridge check --frame`",
-        )
+        if far.yaw:
+            yield Finding(
+                link,
+                Verdict.BAD,
+                far.yaw,
+                "take over by hand and land; then see marker and room_yaw_deg by `posebridge check --frame`",
+            )
 
 
 def _poses_held(now: Readings) -> Iterator[Finding]:
     for link, far in _far_ends(now):
-        yield Finding(
-            link,
-            when(bool(far.holding)),
-            f"no poses go to {link}: {far.holding}",
-            "wait for its EKF; if it stays so, see the origin in docs/autopilots.md",
-        )
+        if far.holding:
+            yield Finding(
+                link,
+                Verdict.BAD,
+                f"no poses go to {link}: {far.holding}",
+                "wait for its EKF; if it stays so, see the origin in docs/autopilots.md",
+            )
 
 
 def _autopilot_unheard(now: Readings) -> Iterator[Finding]:
     for link, far in _far_ends(now):
-        yield Finding(
-            link,
-            when(far.peer is None and now.running_s > HEARD_S),
-            f"no autopilot heard on {link} in {now.running_s:.0f} s: poses go out, nobody says that they arrive",
-            "connect both wires; give the port MAVLink 2 (ArduPilot: SERIALn_PROTOCOL 2) and the right baud",
-        )
+        if far.peer is None and now.running_s > HEARD_S:
+            yield Finding(
+                link,
+                Verdict.BAD,
+                f"no autopilot heard on {link} in {now.running_s:.0f} s: poses go out, nobody says that they arrive",
+                "connect both wires; give the port MAVLink 2 (ArduPilot: SERIALn_PROTOCOL 2) and the right baud",
+            )
 
 
 def _time_sync(now: Readings) -> Iterator[Finding]:
     for link, far in _far_ends(now):
-        yield Finding(
-            link,
-            when(far.peer is not None and not far.away and far.sync is None and now.running_s > SYNC_S),
-            f"no TIMESYNC reply on {link} was quick enough to use: the autopilot's clock is not known",
-            "check that the round trip is under 10 ms: a faster baud, or fewer other streams on this port",
-        )
+        if far.peer is not None and not far.away and far.sync is None and now.running_s > SYNC_S:
+            yield Finding(
+                link,
+                Verdict.BAD,
+                f"no TIMESYNC reply on {link} was quick enough to use: the autopilot's clock is not known",
+                "check that the round trip is under 10 ms: a faster baud, or fewer other streams on this port",
+            )
 
 
 LINK_RULES = (

@@ -36,7 +36,11 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Rule:
-    """One alarm. raise_s, clear_s: how long a verdict must last to raise it, and to end it [s]."""
+    """One alarm.
+
+    raise_s, clear_s: how long a verdict must last to raise it, and to end it [s].
+    judge: finds what is not well; of a subject that is, it says nothing, since words for nobody cost a flight time.
+    """
 
     name: str
     level: Level
@@ -55,7 +59,3 @@ def above(value: float | None, bad: float, good: float) -> Verdict:
 def below(value: float | None, bad: float, good: float) -> Verdict:
     """Judge a value that should be large."""
     return above(None if value is None else -value, -bad, -good)
-
-
-def when(bad: bool) -> Verdict:
-    return Verdict.BAD if bad else Verdict.GOOD

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 from bridge.alarms.link_rules import LINK_RULES
 from bridge.alarms.readings import Readings
-from bridge.alarms.rule import Finding, Level, Rule, Verdict, above, below, when
+from bridge.alarms.rule import Finding, Level, Rule, Verdict, above, below
 from tracker.types import TrackState
 
 SETTLE_S = 3.0
@@ -25,167 +25,192 @@ OFFSET_MS, OFFSET_SIGMAS, OFFSET_KNOWN_MS = 3.0, 4.0, 1.5
 
 
 def _track_lost(now: Readings) -> Iterator[Finding]:
-    why = f"; last left out: {now.last_rejection}" if now.last_rejection else ""
-    yield Finding(
-        "",
-        when(now.state is TrackState.LOST),
-        f"track lost for {now.state_s:.1f} s: nothing is sent{why}",
-        "land or fly by hand; bring every ball into the view of two cameras",
-    )
+    if now.state is TrackState.LOST:
+        why = f"; last left out: {now.last_rejection}" if now.last_rejection else ""
+        yield Finding(
+            "",
+            Verdict.BAD,
+            f"track lost for {now.state_s:.1f} s: nothing is sent{why}",
+            "land or fly by hand; bring every ball into the view of two cameras",
+        )
 
 
 def _marker_not_found(now: Readings) -> Iterator[Finding]:
-    why = f"; last: {now.last_rejection}" if now.last_rejection else ""
-    yield Finding(
-        "",
-        when(now.state is TrackState.SEARCHING and now.running_s > SOUGHT_S),
-        f"marker not found in {now.running_s:.0f} s{why}",
-        "run `posebridge colours`; check light, lens caps, calibration and that all balls are in two images",
-    )
+    if now.state is TrackState.SEARCHING and now.running_s > SOUGHT_S:
+        why = f"; last: {now.last_rejection}" if now.last_rejection else ""
+        yield Finding(
+            "",
+            Verdict.BAD,
+            f"marker not found in {now.running_s:.0f} s{why}",
+            "run `posebridge colours`; check light, lens caps, calibration and that all balls are in two images",
+        )
 
 
 def _rate(now: Readings) -> Iterator[Finding]:
     need_hz = now.limits.rate_min_hz
     steady = now.state is TrackState.TRACKING and now.state_s > SETTLE_S
     verdict = below(now.rate_hz, RATE_SLACK * need_hz, RATE_BACK * need_hz) if steady else Verdict.GOOD
-    yield Finding(
-        "",
-        verdict,
-        f"rate {now.rate_hz:.1f} Hz, needed {need_hz:g} Hz",
-        "shorten the exposure, check the cameras' frame rate and what else this computer does",
-    )
+    if verdict is not Verdict.GOOD:
+        yield Finding(
+            "",
+            verdict,
+            f"rate {now.rate_hz:.1f} Hz, needed {need_hz:g} Hz",
+            "shorten the exposure, check the cameras' frame rate and what else this computer does",
+        )
 
 
 def _gap_severe(now: Readings) -> Iterator[Finding]:
-    yield Finding(
-        "",
-        above(now.gap_ms, GAP_SEVERE_MS, GAP_SEVERE_MS),
-        f"a gap of {now.gap_ms or 0:.0f} ms between poses; ArduPilot gives vision up after {GAP_SEVERE_MS:.0f} ms",
-        "find what covers the balls, stops a camera or holds this computer up",
-    )
+    verdict = above(now.gap_ms, GAP_SEVERE_MS, GAP_SEVERE_MS)
+    if verdict is not Verdict.GOOD:
+        yield Finding(
+            "",
+            verdict,
+            f"a gap of {now.gap_ms or 0:.0f} ms between poses; ArduPilot gives vision up after {GAP_SEVERE_MS:.0f} ms",
+            "find what covers the balls, stops a camera or holds this computer up",
+        )
 
 
 def _gap(now: Readings) -> Iterator[Finding]:
-    yield Finding(
-        "",
-        above(now.gap_ms, GAP_MS, GAP_MS),
-        f"a gap of {now.gap_ms or 0:.0f} ms between poses, limit {GAP_MS:.0f} ms",
-        "look at what was left out and at the frames of each camera",
-    )
+    verdict = above(now.gap_ms, GAP_MS, GAP_MS)
+    if verdict is not Verdict.GOOD:
+        yield Finding(
+            "",
+            verdict,
+            f"a gap of {now.gap_ms or 0:.0f} ms between poses, limit {GAP_MS:.0f} ms",
+            "look at what was left out and at the frames of each camera",
+        )
 
 
 def _latency(now: Readings) -> Iterator[Finding]:
     limit_ms = now.limits.latency_limit_ms
-    yield Finding(
-        "",
-        above(now.latency_p99_ms, limit_ms, 0.9 * limit_ms),
-        f"latency p99 {now.latency_p99_ms or 0:.0f} ms, limit {limit_ms:g} ms",
-        "stop other programs on this computer, or track fewer or smaller images",
-    )
+    verdict = above(now.latency_p99_ms, limit_ms, 0.9 * limit_ms)
+    if verdict is not Verdict.GOOD:
+        yield Finding(
+            "",
+            verdict,
+            f"latency p99 {now.latency_p99_ms or 0:.0f} ms, limit {limit_ms:g} ms",
+            "stop other programs on this computer, or track fewer or smaller images",
+        )
 
 
 def _age(now: Readings) -> Iterator[Finding]:
     limit_ms = now.limits.max_age_ms
-    yield Finding(
-        "",
-        above(now.age_ms, limit_ms, 0.8 * limit_ms),
-        f"poses are {now.age_ms or 0:.0f} ms old when they could leave, limit {limit_ms:g} ms: those are not sent",
-        "this computer falls behind its cameras: lower their frame rate, or check their latency_ms",
-    )
+    verdict = above(now.age_ms, limit_ms, 0.8 * limit_ms)
+    if verdict is not Verdict.GOOD:
+        yield Finding(
+            "",
+            verdict,
+            f"poses are {now.age_ms or 0:.0f} ms old when they could leave, limit {limit_ms:g} ms: those are not sent",
+            "this computer falls behind its cameras: lower their frame rate, or check their latency_ms",
+        )
 
 
 def _nis_high(now: Readings) -> Iterator[Finding]:
-    yield Finding(
-        "",
-        above(now.nis_ratio, NIS_HIGH, 0.9 * NIS_HIGH),
-        f"NIS {now.nis_ratio or 0:.2f} times its expectation, limit {NIS_HIGH:g}: the images disagree with the model",
-        "calibrate the cameras anew, check the balls' positions in the config and the cameras' clocks",
-    )
+    verdict = above(now.nis_ratio, NIS_HIGH, 0.9 * NIS_HIGH)
+    if verdict is not Verdict.GOOD:
+        yield Finding(
+            "",
+            verdict,
+            f"NIS {now.nis_ratio or 0:.2f} times its expectation, limit {NIS_HIGH:g}: images and model disagree",
+            "calibrate the cameras anew, check the balls' positions in the config and the cameras' clocks",
+        )
 
 
 def _nis_low(now: Readings) -> Iterator[Finding]:
-    yield Finding(
-        "",
-        below(now.nis_ratio, NIS_LOW, 1.1 * NIS_LOW),
-        f"NIS {now.nis_ratio or 0:.2f} times its expectation, limit {NIS_LOW:g}: the filter is too cautious",
-        "lessen pixel_noise_px or [tracker.process] in the config",
-    )
+    verdict = below(now.nis_ratio, NIS_LOW, 1.1 * NIS_LOW)
+    if verdict is not Verdict.GOOD:
+        yield Finding(
+            "",
+            verdict,
+            f"NIS {now.nis_ratio or 0:.2f} times its expectation, limit {NIS_LOW:g}: the filter is too cautious",
+            "lessen pixel_noise_px or [tracker.process] in the config",
+        )
 
 
 def _camera_silent(now: Readings) -> Iterator[Finding]:
     for camera in now.cameras:
-        yield Finding(
-            camera.name,
-            above(camera.silent_ms, SILENT_MS, SILENT_MS / 2),
-            f"{camera.name} has given no frame for {camera.silent_ms / 1e3:.1f} s",
-            "check its cable, power and USB bus; it is taken back by itself",
-        )
+        verdict = above(camera.silent_ms, SILENT_MS, SILENT_MS / 2)
+        if verdict is not Verdict.GOOD:
+            yield Finding(
+                camera.name,
+                verdict,
+                f"{camera.name} has given no frame for {camera.silent_ms / 1e3:.1f} s",
+                "check its cable, power and USB bus; it is taken back by itself",
+            )
 
 
 def _camera_blind(now: Readings) -> Iterator[Finding]:
     for camera in now.cameras:
-        yield Finding(
-            camera.name,
-            above(camera.blind_s, BLIND_S, 1.0),
-            f"{camera.name} gives frames, but no ball in them was used for {camera.blind_s:.0f} s",
-            "look through it (`posebridge colours --picture`): lens, light, focus, or it was moved",
-        )
+        verdict = above(camera.blind_s, BLIND_S, 1.0)
+        if verdict is not Verdict.GOOD:
+            yield Finding(
+                camera.name,
+                verdict,
+                f"{camera.name} gives frames, but no ball in them was used for {camera.blind_s:.0f} s",
+                "look through it (`posebridge colours --picture`): lens, light, focus, or it was moved",
+            )
 
 
 def _ball_unseen(now: Readings) -> Iterator[Finding]:
     for ball in now.balls:
-        yield Finding(
-            ball.name,
-            above(ball.unseen_s, UNSEEN_S, 1.0),
-            f"no camera has seen the {ball.name} ball for {ball.unseen_s:.0f} s",
-            "check its paint and light, and learn the colours anew (`posebridge colours`)",
-        )
+        verdict = above(ball.unseen_s, UNSEEN_S, 1.0)
+        if verdict is not Verdict.GOOD:
+            yield Finding(
+                ball.name,
+                verdict,
+                f"no camera has seen the {ball.name} ball for {ball.unseen_s:.0f} s",
+                "check its paint and light, and learn the colours anew (`posebridge colours`)",
+            )
 
 
 def _clock_offset(now: Readings) -> Iterator[Finding]:
     for camera in now.cameras:
         found_ms, sigma_ms = camera.clock_offset_ms or 0.0, camera.clock_sigma_ms
         known = sigma_ms is not None and sigma_ms < OFFSET_KNOWN_MS and abs(found_ms) > OFFSET_SIGMAS * sigma_ms
-        yield Finding(
-            camera.name,
-            above(abs(found_ms), OFFSET_MS, 0.7 * OFFSET_MS) if known else Verdict.GOOD,
-            f"{camera.name} sees {found_ms:+.1f} ms later than its stamps say (sigma {sigma_ms or 0:.1f} ms)",
-            f"set clock_offset_ms = {camera.configured_offset_ms + found_ms:.1f} for {camera.name} in the config",
-        )
+        verdict = above(abs(found_ms), OFFSET_MS, 0.7 * OFFSET_MS) if known else Verdict.GOOD
+        if verdict is not Verdict.GOOD:
+            yield Finding(
+                camera.name,
+                verdict,
+                f"{camera.name} sees {found_ms:+.1f} ms later than its stamps say (sigma {sigma_ms or 0:.1f} ms)",
+                f"set clock_offset_ms = {camera.configured_offset_ms + found_ms:.1f} for {camera.name} in the config",
+            )
 
 
 def _camera_moved(now: Readings) -> Iterator[Finding]:
     for camera in now.cameras:
-        seen = f": the room stands {camera.shift_px:.1f} px off in its picture" if camera.shift_px else ""
-        yield Finding(
-            camera.name,
-            when(camera.moved),
-            f"{camera.name} was moved{seen}, {camera.at_vehicle_mm:.0f} mm at the vehicle",
-            "land, fix it; then `posebridge calibrate refine LOG`, or calibrate the room anew",
-        )
+        if camera.moved:
+            seen = f": the room stands {camera.shift_px:.1f} px off in its picture" if camera.shift_px else ""
+            yield Finding(
+                camera.name,
+                Verdict.BAD,
+                f"{camera.name} was moved{seen}, {camera.at_vehicle_mm:.0f} mm at the vehicle",
+                "land, fix it; then `posebridge calibrate refine LOG`, or calibrate the room anew",
+            )
 
 
 def _cameras_at_odds(now: Readings) -> Iterator[Finding]:
-    yield Finding(
-        "",
-        when(now.at_odds),
-        f"a camera was moved: rays to the balls miss by {now.epipolar_px or 0:.1f} px, and nothing tells whose",
-        "land, see which hangs loose; then calibrate the room anew; hang something with corners where they look",
-    )
+    if now.at_odds:
+        yield Finding(
+            "",
+            Verdict.BAD,
+            f"a camera was moved: rays to the balls miss by {now.epipolar_px or 0:.1f} px, and nothing tells whose",
+            "land, see which hangs loose; then calibrate the room anew; hang something with corners where they look",
+        )
 
 
 def _log_stopped(now: Readings) -> Iterator[Finding]:
     log = now.around.log
-    if log is not None:
-        yield Finding("", when(bool(log.error)), log.error, "free space on the disk and start anew; the flight goes on")
+    if log is not None and log.error:
+        yield Finding("", Verdict.BAD, log.error, "free space on the disk and start anew; the flight goes on")
 
 
 def _log_dropping(now: Readings) -> Iterator[Finding]:
     log = now.around.log
-    if log is not None and not log.error:
+    if log is not None and not log.error and log.dropped > 0:
         yield Finding(
             "",
-            when(log.dropped > 0),
+            Verdict.BAD,
             f"the log lacks {log.dropped} steps: the disk is slower than the flight",
             "log to a faster disk",
         )

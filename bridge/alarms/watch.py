@@ -47,18 +47,19 @@ Standing = Mapping[tuple[str, str], Watch]
 """Every rule and subject that is not at rest."""
 
 NOTHING: Standing = MappingProxyType({})
+_BY_NAME = {rule.name: rule for rule in RULES}
 _CALM = Watch()
+_WELL = Finding("", Verdict.GOOD, "", "")  # of a subject that its rule does not mention
 
 
 def advance(standing: Standing, now: Readings) -> Standing:
     """Judge new readings and return how the alarms stand after them."""
+    found = {(rule.name, finding.subject): finding for rule in RULES for finding in rule.judge(now)}
     watches: dict[tuple[str, str], Watch] = {}
-    for rule in RULES:
-        for finding in rule.judge(now):
-            key = (rule.name, finding.subject)
-            watch = _after(standing.get(key, _CALM), finding, rule, now.t_ns)
-            if watch is not _CALM:
-                watches[key] = watch
+    for key in dict.fromkeys((*found, *standing)):
+        watch = _after(standing.get(key, _CALM), found.get(key, _WELL), _BY_NAME[key[0]], now.t_ns)
+        if watch is not _CALM:
+            watches[key] = watch
     return watches
 
 

@@ -2,6 +2,10 @@
 
 What ArduPilot's EKF3 does (found by flying its SITL): an origin that comes before "EKF3 active" is lost or, worse,
 acknowledged and lost, after which every later one is refused until a reboot; 0, 0 is refused.
+
+What PX4's EKF2 does from 1.16 on (read in its source; 1.17 development flown): when vision's height begins, it takes
+the height above the room for one above the sea. So after a gap in the poses its local height jumps by the origin's
+altitude, and it climbs as far. PX4 is told altitude 0 therefore, with which the two are the same.
 """
 
 from __future__ import annotations
@@ -124,15 +128,16 @@ class OriginKeeper:
         return [_request(peer, "GLOBAL_POSITION_INT", now_ns)]
 
     def _tell(self, peer: Peer, origin: Origin, now_ns: int) -> Message:
+        altitude_m = 0.0 if peer.autopilot is Autopilot.PX4 else origin.altitude_m
         latitude, longitude = round(origin.latitude_deg * 1e7), round(origin.longitude_deg * 1e7)
         if self._plain or peer.autopilot is not Autopilot.ARDUPILOT:
             return make_message(
                 "SET_GPS_GLOBAL_ORIGIN", now_ns, target_system=peer.system_id, latitude=latitude, longitude=longitude,
-                altitude=round(origin.altitude_m * 1000.0), time_usec=now_ns // 1000,
+                altitude=round(altitude_m * 1000.0), time_usec=now_ns // 1000,
             )  # fmt: skip
         return make_message(
             "COMMAND_INT", now_ns, "origin", target_system=peer.system_id, target_component=peer.component_id,
-            frame=enum("MAV_FRAME_GLOBAL"), command=DO_SET_GLOBAL_ORIGIN, x=latitude, y=longitude, z=origin.altitude_m,
+            frame=enum("MAV_FRAME_GLOBAL"), command=DO_SET_GLOBAL_ORIGIN, x=latitude, y=longitude, z=altitude_m,
         )  # fmt: skip
 
     def _take_acknowledgement(self, ack: Received) -> None:

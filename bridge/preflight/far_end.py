@@ -5,18 +5,22 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 from bridge.dialogue import DialogueState
-from bridge.dialogue.origin import OriginState
+from bridge.dialogue.origin import SAME_M, OriginState
 from bridge.dialogue.peer import Autopilot, Peer
 from bridge.preflight import ardupilot
 from bridge.preflight.hearing import Hearing
 from bridge.preflight.parameters import Parameter
 from bridge.preflight.requests import POSITION, VERSION
 from bridge.preflight.verdict import Line, Mark
+from bridge.wire import Received
 
 OLDEST: Mapping[Autopilot, tuple[int, int, str]] = {
     Autopilot.ARDUPILOT: (4, 1, "4.1: EK3_SRC1_* came with it"),
     Autopilot.PX4: (1, 14, "1.14: EKF2_EV_CTRL came with it"),
 }
+PX4_JUMPS = (1, 16)
+"""The first PX4 that mistakes the height above the room for one above the sea."""
+
 _KINDS = ((255, "official"), (192, "release candidate"), (128, "beta"), (64, "alpha"), (0, "development"))
 _BAUDS = {1: 1200, 2: 2400, 4: 4800, 9: 9600, 19: 19200, 38: 38400, 57: 57600, 111: 111100, 115: 115200,
           230: 230400, 256: 256000, 460: 460800, 500: 500000, 921: 921600}  # fmt: skip
@@ -49,23 +53,34 @@ def _others_line(others: set[int], system_id: int | None) -> Line:
 
 
 def _firmware_line(hearing: Hearing, peer: Peer) -> Line:
-    version = hearing.last.get(VERSION)
+    version = _version(hearing)
     oldest = OLDEST.get(peer.autopilot)
     needed = "known" if oldest is None else f"at least {oldest[2]}"
     if version is None:
         fix = f"it sends no {VERSION}: read the version at its ground station"
         return Line(Mark.UNKNOWN if oldest else Mark.WARN, "firmware", "not told", needed, fix)
-    number = version.whole("flight_sw_version")
-    major, minor, patch, kind = number >> 24 & 255, number >> 16 & 255, number >> 8 & 255, number & 255
+    major, minor, patch, kind = version
     found = f"{major}.{minor}.{patch} {next(name for least, name in _KINDS if kind >= least)}"
     if oldest is not None and (major, minor) < oldest[:2]:
         return Line(Mark.FAIL, "firmware", found, needed, "update the firmware")
     return Line(Mark.PASS, "firmware", found, needed)
 
 
+def _version(hearing: Hearing) -> tuple[int, int, int, int] | None:
+    """Return major, minor, patch and kind of the firmware; None where it was not told."""
+    version = hearing.last.get(VERSION)
+    if version is None:
+        return None
+    major, minor, patch, kind = version.whole("flight_sw_version").to_bytes(4, "big")
+    return major, minor, patch, kind
+
+
 def origin_line(state: DialogueState, hearing: Hearing, configured: bool) -> Line:
     """Return the line on the origin. configured: the config has one to tell."""
     what, needed = "origin", "set, and proved by its global position"
+    found = hearing.last.get("GPS_GLOBAL_ORIGIN")
+    if state.peer is not None and state.peer.autopilot is Autopilot.PX4 and found is not None:
+        return _px4_origin_line(found, _version(hearing))
     if not state.origin:
         return Line(Mark.PASS, what, f"not needed by profile {state.profile}", "")
     place = hearing.last.get("GLOBAL_POSITION_INT")
@@ -85,6 +100,21 @@ def origin_line(state: DialogueState, hearing: Hearing, configured: bool) -> Lin
         return Line(Mark.FAIL, what, state.origin, needed, "reboot the autopilot: the bridge then tells it anew")
     fix = "wait until its filter has started (keep it still), then check again"
     return Line(Mark.FAIL if configured else Mark.UNKNOWN, what, state.origin, needed, fix)
+
+
+def _px4_origin_line(origin: Received, version: tuple[int, int, int, int] | None) -> Line:
+    """Judge a PX4's origin: it needs none, and an altitude in it is dangerous (see `bridge.dialogue.origin`)."""
+    what, needed = "origin", "none, or one of altitude 0"
+    altitude_m = origin.whole("altitude") / 1e3
+    where = ", ".join(f"{origin.whole(axis) / 1e7:.5f}" for axis in ("latitude", "longitude"))
+    found = f"it is at {where}, {altitude_m:.0f} m"
+    if abs(altitude_m) < SAME_M or (version is not None and version[:2] < PX4_JUMPS):
+        return Line(Mark.PASS, what, found, needed)
+    fix = (
+        f"after a gap in the poses its height jumps by {altitude_m:.0f} m and it climbs as far: set no origin at the "
+        "ground station and reboot; [origin] of the config it is told with altitude 0"
+    )
+    return Line(Mark.FAIL, what, found, needed, fix)
 
 
 def port_line(known: Mapping[str, Parameter]) -> Line | None:

@@ -22,14 +22,23 @@ MOST_LEVEL_M, MOST_HEIGHT_M, MOST_YAW_DEG = 0.10, 0.15, 5.0
 GOOD_RATIO, MOST_RATIO = 0.5, 0.8  # ArduPilot's failsafe acts at FS_EKF_THRESH, 0.8; at 1 a measurement is refused
 BRACKET_NS = 250_000_000
 LEAST_REPORTS = 5
-ATTITUDE_FLAG, CONSTANT_POSITION, UNINITIALISED = 0x1, 0x80, 0x400
-_NEEDED: dict[Autopilot, int] = {Autopilot.ARDUPILOT: 0x1 | 0x6 | 0x8 | 0x20, Autopilot.PX4: 0x1 | 0x6 | 0x8}
-_FLAGS = ((0x1, "attitude"), (0x2, "level velocity"), (0x4, "climb"), (0x8, "level position"), (0x20, "height"))
+ATTITUDE_FLAG, CONSTANT_POSITION, AIDED, UNINITIALISED = 0x1, 0x80, 0x100, 0x400
+# AIDED of PX4: something holds its level position now; the other flags stay for seconds after that has ended.
+_NEEDED: dict[Autopilot, int] = {Autopilot.ARDUPILOT: 0x1 | 0x6 | 0x8 | 0x20, Autopilot.PX4: 0x1 | 0x6 | 0x8 | AIDED}
+_FLAGS = (
+    (0x1, "attitude"),
+    (0x2, "level velocity"),
+    (0x4, "climb"),
+    (0x8, "level position"),
+    (0x20, "height"),
+    (AIDED, "aid by poses"),
+)
 _RATIOS = {
     Autopilot.ARDUPILOT: ("velocity_variance", "pos_horiz_variance", "pos_vert_variance", "compass_variance"),
     Autopilot.PX4: ("vel_ratio", "pos_horiz_ratio", "pos_vert_ratio", "mag_ratio"),
 }
 _RATIO_NAMES = ("v", "xy", "z", "yaw")
+_LEVEL = _RATIO_NAMES.index("xy")
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,10 +145,11 @@ def _filter_lines(hearing: Hearing, autopilot: Autopilot, since_ns: int) -> Iter
     flags = reports[-1].whole("flags")
     lacking = [what for bit, what in _FLAGS if bit & _NEEDED[autopilot] and not flags & bit]
     needed = "attitude, velocity, position and height"
+    assumed = autopilot is Autopilot.ARDUPILOT and flags & CONSTANT_POSITION  # PX4 sets that whenever it is at rest
     if autopilot is Autopilot.ARDUPILOT and flags & UNINITIALISED:
         fix = "wait until it says EKF3 active; keep it still after power-on"
         yield Line(Mark.FAIL, "filter", f"0x{flags:x}: not started", needed, fix)
-    elif lacking or flags & CONSTANT_POSITION:
+    elif lacking or assumed:
         what = f"lacks {', '.join(lacking)}" if lacking else "holds position by assuming it stands"
         fix = "it uses no poses yet: see the parameters above and what it says below"
         yield Line(Mark.FAIL, "filter", f"0x{flags:x}: {what}", needed, fix)
@@ -149,11 +159,16 @@ def _filter_lines(hearing: Hearing, autopilot: Autopilot, since_ns: int) -> Iter
 
 
 def _ratio_line(ratios: list[list[float]]) -> Line:
-    """Judge the worst test ratios: innovations against what the filter expected of them."""
+    """Judge the worst test ratios: innovations against what the filter expected of them; no number is no innovation."""
     what, needed = "innovations", f"worst below {GOOD_RATIO:g}; from {MOST_RATIO:g} on it is failing"
-    table = np.nan_to_num(np.array(ratios), nan=0.0)
-    worst = table.max(axis=0)
-    found = ", ".join(f"{name} {value:.2f}" for name, value in zip(_RATIO_NAMES, worst, strict=True))
+    table = np.array(ratios)
+    worst = np.nan_to_num(table, nan=0.0).max(axis=0)
+    used = np.isfinite(table).any(axis=0)
+    columns = zip(_RATIO_NAMES, worst, used, strict=True)
+    found = ", ".join(f"{name} {value:.2f}" if seen else f"{name} none" for name, value, seen in columns)
+    if not used[_LEVEL]:
+        fix = "it takes no position: see the line on the filter"
+        return Line(Mark.UNKNOWN, what, found, needed, fix)
     if worst.max() < GOOD_RATIO:
         return Line(Mark.PASS, what, found, needed)
     name = _RATIO_NAMES[int(worst.argmax())]

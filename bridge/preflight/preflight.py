@@ -34,6 +34,7 @@ from tracker.types import Step
 WITH_VELOCITY = ("VISION_SPEED_ESTIMATE", "ODOMETRY")
 FRAMES = "Frames"
 _COMMAND_CHECKS, _ACCEPTED = 401, 0
+_WOULD_ARM = 0x1000_0000  # MAV_SYS_STATUS_PREARM_CHECK
 
 
 @dataclass(frozen=True, slots=True)
@@ -157,7 +158,7 @@ class Preflight:
     def _said(self, since_ns: int) -> Section:
         asked_ns = self._asked_checks_ns
         texts = [text for text in self.hearing.texts if text.arrived_ns >= (asked_ns or since_ns)]
-        return said(texts, asked_ns is not None, self._checks_ran(asked_ns))
+        return said(texts, asked_ns is not None, self._checks_ran(asked_ns), self._ready())
 
     def _frames(self) -> Section:
         """Judge the guided moves."""
@@ -217,6 +218,13 @@ class Preflight:
     def _checks_ran(self, asked_ns: int | None) -> bool:
         acks = [] if asked_ns is None else self.hearing.since("COMMAND_ACK", asked_ns)
         return any(ack.whole("command") == _COMMAND_CHECKS and ack.whole("result") == _ACCEPTED for ack in acks)
+
+    def _ready(self) -> bool | None:
+        """Say whether a PX4 says that it would arm; ArduPilot says it in words."""
+        status = self.hearing.last.get("SYS_STATUS")
+        if status is None or self.peer is None or self.peer.autopilot is not Autopilot.PX4:
+            return None
+        return bool(status.whole("onboard_control_sensors_health") & _WOULD_ARM)
 
     def _lag_s(self) -> float:
         return 0.0 if self.parameters is None else gyro_lag_s(self.parameters.known)

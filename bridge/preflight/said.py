@@ -14,15 +14,16 @@ ARMS = "nothing, in its present mode"
 _AGAINST = re.compile(r"^(PreArm|Arm|Preflight Fail)\b", re.IGNORECASE)
 
 
-def said(texts: Iterable[Text], asked: bool, answered: bool) -> Section:
+def said(texts: Iterable[Text], asked: bool, answered: bool, ready: bool | None = None) -> Section:
     """Return the section.
 
     asked, answered: whether its own checks were run, and whether it took the order.
+    ready: whether it says that it would arm, None where it does not tell.
     """
     distinct = list(dict.fromkeys(text.text for text in texts))
     lines = [line for line in map(_line, distinct) if line is not None]
     if asked and not any(_AGAINST.match(text) for text in distinct):
-        lines.append(_quiet(answered))
+        lines.append(_unready() if ready is False else _quiet(answered))
     return Section(TITLE, tuple(lines), tuple(note for note in map(_note, distinct) if note))
 
 
@@ -36,6 +37,12 @@ def _line(text: str) -> Line | None:
         return None
     mark = Mark.FAIL if meaning.weight is Weight.BLOCKS else Mark.WARN
     return Line(mark, f'"{text}"', meaning.meaning, "", f"cause: {meaning.cause}. Remedy: {meaning.remedy}")
+
+
+def _unready() -> Line:
+    """Speak for an autopilot that gives its reasons by other ways than STATUSTEXT: PX4 sends most as events."""
+    fix = "its ground station names them (QGroundControl: the arming checks behind the flight mode)"
+    return Line(Mark.WARN, "its own checks", "it will not arm, and says no reason here", ARMS, fix)
 
 
 def _quiet(answered: bool) -> Line:

@@ -17,6 +17,7 @@ from tracker.sources.sensor_yaml import read_camera
 from tracker.types import frozen_array
 
 METRES_PER_MM = 1e-3
+NS_PER_MS = 1e6
 
 
 class RigOrigin(StrEnum):
@@ -55,11 +56,17 @@ def rig_of(settings: Settings, source_cameras: tuple[Camera, ...] | None, camera
             f"rig: {len(cameras)} cameras ({origin}) but the source has {camera_count}; "
             "name as many in --source as the rig has, or correct the config's [rig]"
         )
-    offsets_ms = [camera.clock_offset_ms for camera in settings.rig.cameras] + [0.0] * len(cameras)
-    cameras = tuple(
-        replace(c, clock_offset_ns=round(ms * 1e6)) if ms else c for c, ms in zip(cameras, offsets_ms, strict=False)
-    )
-    return ChosenRig(make_rig(cameras, marker_of(settings.marker)), origin)
+    tables = (*settings.rig.cameras, *[None] * len(cameras))
+    timed = tuple(_timed(camera, table) for camera, table in zip(cameras, tables, strict=False))
+    return ChosenRig(make_rig(timed, marker_of(settings.marker)), origin)
+
+
+def _timed(camera: Camera, table: CameraSettings | None) -> Camera:
+    """Return the camera with what its table in the config, whatever else counts, knows of its clock and shutter."""
+    if table is None or not (table.clock_offset_ms or table.readout_ms):
+        return camera
+    offset_ns, readout_ns = round(table.clock_offset_ms * NS_PER_MS), round(table.readout_ms * NS_PER_MS)
+    return replace(camera, clock_offset_ns=offset_ns, readout_ns=readout_ns)
 
 
 def marker_of(marker: MarkerSettings) -> Marker:

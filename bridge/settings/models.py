@@ -55,6 +55,7 @@ class CameraSettings(Section):
     latency_ms: Annotated[float, Strict(), Field(ge=0, le=1000)] | None = None
     lock: bool = True
     clock_offset_ms: Annotated[float, Strict(), Field(ge=-1000, le=1000)] = 0.0
+    readout_ms: Annotated[float, Strict(), Field(ge=-100, le=100)] = 0.0
 
 
 class RigSettings(Section):

@@ -54,6 +54,7 @@ def test_pymavlink_reads_every_message_both_ways_in_the_order_of_their_times(tlo
     read = []
     while (message := log.recv_match()) is not None:
         read.append(message)
+    log.close()
     assert [message.get_type() for message in read] == ["ATTITUDE", POSE] * 45
     assert [message.get_srcComponent() for message in read[:2]] == [1, 197]
     assert [message.time_boot_ms for message in read[::2]] == list(range(45))
@@ -64,14 +65,14 @@ def test_pymavlink_reads_every_message_both_ways_in_the_order_of_their_times(tlo
 
 def test_its_times_are_the_wall_clocks_in_microseconds_big_end_first(tlog: Path) -> None:
     data = tlog.read_bytes()
-    assert int.from_bytes(data[:8], "big") == (WALL_NS - 3_000_000) // 1000
+    assert int.from_bytes(data[:8], "big") == (WALL_NS - 3_000_000) // 1000 // 4 * 4  # the last two bits: link 0
     assert data[8] == 0xFD
 
 
-def test_mavlogdump_prints_it(tlog: Path) -> None:
+def test_mavlogdump_prints_the_link_that_it_is_asked_for(tlog: Path) -> None:
     tool = Path(pymavlink.__file__).parent / "tools" / "mavlogdump.py"
     done = subprocess.run(
-        [sys.executable, "-W", "ignore", str(tool), "--types", POSE, str(tlog)],
+        [sys.executable, "-W", "ignore", str(tool), "--link", "0", "--types", POSE, str(tlog)],
         capture_output=True, text=True, check=True, timeout=60,
     )  # fmt: skip
     lines = done.stdout.splitlines()
@@ -93,6 +94,31 @@ def test_a_killed_recorder_leaves_whole_records_up_to_its_last_second(tmp_path: 
     assert len(data) % record_bytes == 0
     last_us = int.from_bytes(data[-record_bytes : 8 - record_bytes], "big")
     assert last_ns - last_us * 1000 < SECOND_NS
+
+
+def test_several_links_have_a_file_each_and_none_finds_losses_in_its_own(tmp_path: Path) -> None:
+    """Each end counts its frames a link; in one file pymavlink would miss one before nearly every frame."""
+    path, other = tmp_path / "a.tlog", "udpout:127.0.0.1:14551"
+    with recorder(path.with_suffix(".mcap"), tlog=path, links=(LINK, other)) as log:
+        for k in range(30):
+            now_ns = START_NS + k * SECOND_NS // 15
+            heard = Heard(received=((LINK, came(k, now_ns)), (other, came(k + 7, now_ns))))
+            log.take(None, step(estimate(now_ns)), (), now_ns, heard)
+    assert not path.exists()
+    for number, first in ((0, 0), (1, 7)):
+        read = mavutil.mavlogfile(str(path.with_suffix(f".{number}.tlog")))
+        messages = [read.recv_match() for _ in range(30)]
+        assert [message.time_boot_ms for message in messages] == list(range(first, first + 30))
+        assert {message._link for message in messages} == {number}
+        assert read.packet_loss() == 0.0
+        read.close()
+
+
+def test_where_one_links_file_exists_none_is_begun(tmp_path: Path) -> None:
+    (tmp_path / "a.1.tlog").write_bytes(b"an earlier flight")
+    with pytest.raises(OperatorError, match=r"a\.1\.tlog: the file exists"):
+        recorder(tmp_path / "a.mcap", tlog=tmp_path / "a.tlog", links=(LINK, "udpout:127.0.0.1:14551"))
+    assert [each.name for each in tmp_path.iterdir()] == ["a.1.tlog"]
 
 
 def test_a_full_disk_ends_it_and_neither_log_nor_flight(full_disk: Path, tmp_path: Path) -> None:

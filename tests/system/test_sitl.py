@@ -6,6 +6,8 @@ import io
 import itertools
 import json
 import os
+import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -14,17 +16,19 @@ from rich.console import Console
 from tools.request import Clocks
 from tools.sitl.command import show
 from tools.sitl.faults import FAULTS
+from tools.sitl.radio import free_port
 from tools.sitl.report import SitlReport
 from tools.sitl.session import LOG, REPORT, SitlRequest, fly
+from tools.sitl.setup import parameter_file
 from tracker.errors import OperatorError
 
 MISSION_S = 30.0
 
 
-def flown(binary: Path | None, out: Path, *, faults: bool) -> SitlReport:
+def flown(binary: Path | None, out: Path, *, faults: bool, connect: str | None = None) -> SitlReport:
     reading = itertools.count(1, 1000)
     clocks = Clocks(lambda: next(reading), lambda: next(reading), lambda: 10**18, lambda _: None)
-    return fly(SitlRequest(binary, "heli", "lab", out, faults, MISSION_S), clocks, Console(file=io.StringIO()))
+    return fly(SitlRequest(binary, "heli", "lab", out, faults, MISSION_S, connect), clocks, Console(file=io.StringIO()))
 
 
 @pytest.fixture(scope="module")
@@ -96,3 +100,26 @@ def test_ardupilots_own_program_flies_the_same_plan(tmp_path: Path) -> None:
     assert not [outcome.fault.name for outcome in report.outcomes if outcome.failsafe]
     assert json.loads((tmp_path / REPORT).read_text())["autopilot"] == "ArduPilot"
     assert (tmp_path / LOG).stat().st_size > 100_000
+
+
+@pytest.fixture
+def running_program(tmp_path: Path) -> Iterator[str]:
+    """Start ArduPilot's program as docs/sitl.md tells a user to; return the URI of its SERIAL0."""
+    parameters, port = tmp_path / "vision.parm", free_port()
+    parameters.write_text(parameter_file(30, {}), encoding="utf-8")
+    command = (
+        *(os.environ["ARDUPILOT_SITL"], "--base-port", str(port), "-I0", "--model", "JSON:127.0.0.1"),
+        *("--speedup", "100", "--wipe", "--defaults", str(parameters), "--home", "47.0,8.0,400,0"),
+    )
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.STDOUT) as program:
+        assert program.stdout is not None
+        next(line for line in program.stdout if b"Waiting for connection" in line)
+        yield f"tcp:127.0.0.1:{port}"
+        program.kill()
+
+
+@pytest.mark.sitl
+def test_one_that_runs_already_is_taken_and_flies_the_plan(running_program: str, tmp_path: Path) -> None:
+    report = flown(None, tmp_path, faults=False, connect=running_program)
+    assert not [line for line in report.verdict.lines if not line.passed]
+    assert report.autopilot == "ArduPilot"

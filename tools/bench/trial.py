@@ -134,10 +134,14 @@ def fly(trial: Trial, troubles: Troubles | None = None, spoil: Spoil | None = No
     """
     settings = load_settings(trial.config)
     rig = trial.rig or rig_of(settings, None).rig
-    tracker = tracker_of(settings, rig, _CLOCKS)
     events = footage(trial, rig, troubles)
-    passed = spoil(list(events)) if spoil else events
-    steps = [*(tracker.step(event) for event in passed), tracker.finish()]
+    return tracked(trial, rig, spoil(list(events)) if spoil else events)
+
+
+def tracked(trial: Trial, rig: Rig, events: Iterable[Event]) -> Flown:
+    """Track what a trial's cameras gave, with a rig as the tracker is told of it, and compare with the truth."""
+    tracker = tracker_of(load_settings(trial.config), rig, _CLOCKS)
+    steps = [*(tracker.step(event) for event in events), tracker.finish()]
     return compared(steps, trial.vehicle())
 
 

@@ -14,7 +14,7 @@ from tools.export.lines import write_csv, write_tum
 from tools.export.outfile import whole_or_absent
 from tools.export.report import Report, report_of, to_json
 from tools.export.survey import survey
-from tools.export.tlog import Topics, write_tlog
+from tools.export.tlog import Topics, links_of, write_tlog
 from tracker.errors import OperatorError
 
 FORMATS = ("csv", "mat", "parquet", "tlog", "tum")
@@ -76,7 +76,7 @@ def export(log_path: Path, terms: ExportTerms, out_path: Path, on_offset: OnOffs
         return _export_grid(reader, terms, terms.rate_hz, out_path, on_offset)
     with whole_or_absent(out_path) as path:
         if terms.format == "tlog":
-            count = write_tlog(reader.records(Topics(), on_offset), path)
+            count = write_tlog(reader.records(Topics(), on_offset), path, links_of(reader))
         elif terms.format in _LINES:
             count = _LINES[terms.format](reader.records(_ESTIMATES, on_offset), path)
         else:

@@ -1,4 +1,4 @@
-"""A log's MAVLink frames as a .tlog: eight bytes of wall clock, big-endian [us since 1970], one frame, and so on.
+"""A log's MAVLink frames as one .tlog, all links in it, in the form of `bridge.log.tlog`.
 
 Ground stations, MAVExplorer and pymavlink's tools read it. The wall clock is that of `/clock`,
 as it was last read, within a second; a log that has none gives stream time.
@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import base64
 import heapq
-import struct
-from collections.abc import Iterator
+import json
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 from bridge.log import topics
-from bridge.log.reader import Record
+from bridge.log.reader import LogReader, Record
+from bridge.log.tlog import stamp
 from tools.export.columns import RECEIVED_PREFIX
 
-_TIME = struct.Struct(">Q")
 HELD_NS = 2_000_000_000  # a message is written so long after it came at most: slow links report late
 
 
@@ -34,11 +34,22 @@ class Topics:
 class _Frame(NamedTuple):
     at_ns: int
     number: int
+    link: int
     raw: bytes
 
 
-def write_tlog(records: Iterator[Record], path: Path) -> int:
-    """Write every frame sent and received, in the order of their times; return how many."""
+def links_of(reader: LogReader) -> tuple[str, ...]:
+    """Return the names of a log's links as its config orders them; none where it holds no config."""
+    config = json.loads(reader.attachments().get("config.json", b"{}"))
+    return tuple(str(link["uri"]) for link in config.get("links", ()))
+
+
+def write_tlog(records: Iterator[Record], path: Path, links: Sequence[str]) -> int:
+    """Write every frame sent and received, in the order of their times; return how many.
+
+    links: in the order of their numbers; one that is not among them gets the next.
+    """
+    numbers = {link: number for number, link in enumerate(links)}
     waiting: list[_Frame] = []
     wall_ahead_ns = 0
     count = 0
@@ -48,7 +59,9 @@ def write_tlog(records: Iterator[Record], path: Path) -> int:
                 wall_ahead_ns = record.value["wall_ns"] - record.value["stream_ns"]
                 continue
             at_ns = record.value.get("arrived_ns", record.log_ns)
-            heapq.heappush(waiting, _Frame(at_ns + wall_ahead_ns, count, base64.b64decode(record.value["raw"])))
+            link = numbers.setdefault(record.value["link"], len(numbers))
+            frame = _Frame(at_ns + wall_ahead_ns, count, link, base64.b64decode(record.value["raw"]))
+            heapq.heappush(waiting, frame)
             count += 1
             while waiting[0].at_ns < record.log_ns + wall_ahead_ns - HELD_NS:
                 file.write(_packed(heapq.heappop(waiting)))
@@ -58,4 +71,4 @@ def write_tlog(records: Iterator[Record], path: Path) -> int:
 
 
 def _packed(frame: _Frame) -> bytes:
-    return _TIME.pack(max(0, frame.at_ns // 1000)) + frame.raw
+    return stamp(frame.at_ns, frame.link) + frame.raw

@@ -12,6 +12,7 @@ from tools.simulate.autopilot.parameters import FOR_VISION
 from tools.simulate.helicopter import Helicopter
 from tools.sitl.airframe import VEHICLE
 from tools.sitl.ground import GroundStation
+from tools.sitl.late import LateWire
 from tools.sitl.lockstep import PHYSICS_PORT
 from tools.sitl.pilots import ArduPilot, Own, Radio
 from tools.sitl.process import Simulator, Wiring
@@ -108,11 +109,19 @@ def running(uri: str, folder: Path, given: Conditions, radio: Radio) -> Aboard:
     with ExitStack() as opened:
         pilot = ArduPilot(given.room_yaw_deg, radio, given.start_ns, PHYSICS_PORT, RADIO_PORT)
         opened.callback(pilot.close)
-        ground = TcpWire(host, port)
-        opened.callback(ground.close)
-        bridge = TcpWire(host, port + BRIDGE_PORT_ABOVE)
+        ground = _ground_wire(host, port, folder / PARAMETERS)
         opened.pop_all()
-    return Aboard(pilot, GroundStation(ground), Relay(bridge), VEHICLE)
+    return Aboard(pilot, GroundStation(ground), Relay(LateWire(host, port + BRIDGE_PORT_ABOVE)), VEHICLE)
+
+
+def _ground_wire(host: str, port: int, parameters: Path) -> TcpWire:
+    try:
+        return TcpWire(host, port)
+    except OperatorError as error:
+        raise OperatorError(
+            f"--connect: {error}; start ArduPilot's SITL with --model JSON:127.0.0.1 --speedup 100 --wipe "
+            f"--defaults {parameters.resolve()} (docs/sitl.md)"
+        ) from error
 
 
 def close(aboard: Aboard) -> None:

@@ -9,11 +9,16 @@ from tools.request import Clocks
 from tools.sitl.report import SitlReport
 from tools.sitl.session import LOG, REPORT, SitlRequest, fly
 
+WIDTH = 140
+"""Of the widest table, in columns: a narrow terminal wraps it, where to cut figures off would lose them."""
+
 
 def run_sitl(request: SitlRequest, clocks: Clocks) -> SitlReport:
     """Fly, and print what came of it on stdout."""
     report = fly(request, clocks)
-    show(report, request, Console())
+    console = Console()
+    console.width = max(console.width, WIDTH)
+    show(report, request, console)
     return report
 
 

@@ -19,7 +19,7 @@ class GroundStation:
     """One end of a wire.
 
     last: the autopilot's newest message of each name, with when it came [ns of simulated time].
-    texts: its STATUSTEXTs with their times.
+    texts: its STATUSTEXTs with their times.  parameters: what it told of them.
     """
 
     def __init__(self, wire: Wire) -> None:
@@ -32,6 +32,7 @@ class GroundStation:
         self.last: dict[str, tuple[int, Mapping[str, FieldValue]]] = {}
         self.acks: dict[int, int] = {}
         self.texts: list[tuple[int, str]] = []
+        self.parameters: dict[str, float] = {}
 
     def tick(self, now_ns: int) -> list[Received]:
         """Hear what has come until now, beat if it is time to; return the autopilot's new messages."""
@@ -44,6 +45,8 @@ class GroundStation:
             self.last[message.message] = now_ns, message.fields
             if message.message == "STATUSTEXT":
                 self.texts.append((now_ns, str(message.fields["text"])))
+            elif message.message == "PARAM_VALUE":
+                self.parameters[str(message.fields["param_id"])] = float(str(message.fields["param_value"]))
             elif message.message == "COMMAND_ACK":
                 self.acks[_whole(message.fields["command"])] = _whole(message.fields["result"])
         return heard

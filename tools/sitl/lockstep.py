@@ -59,7 +59,8 @@ class Lockstep:
         """Wait for the next servo outputs [us], sixteen of them.
 
         Raises:
-            OperatorError: nothing came for long: the simulator has died, or speaks another protocol.
+            OperatorError: nothing came for long: the simulator has died, or speaks another protocol; or one whose
+                clock is not at its beginning.
         """
         while True:
             try:
@@ -77,6 +78,11 @@ class Lockstep:
             if frame == self._frame:
                 self._socket.sendto(self._answer, self._peer)
                 continue
+            if self._frame is None and frame > 0:
+                raise OperatorError(
+                    f"sitl: the simulator has flown before (its physics' step {frame}, not 0) and keeps its clock; "
+                    "start it anew"
+                )
             self._frame = frame
             return tuple(pwm)
 

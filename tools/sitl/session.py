@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 
 from rich.console import Console
@@ -26,12 +27,14 @@ from tools.request import Clocks
 from tools.session import recorder_of, telemetry_of, tracker_of
 from tools.simulate.helicopter import Helicopter
 from tools.simulate.mission import Mission
-from tools.sitl.aboard import Aboard, Conditions, home_of, running, simulated, started
+from tools.sitl.aboard import PARAMETERS, Aboard, Conditions, home_of, running, simulated, started
 from tools.sitl.aboard import close as close_aboard
 from tools.sitl.faults import Faults
 from tools.sitl.flight import Flight
+from tools.sitl.held import hold
 from tools.sitl.relay import Relay
 from tools.sitl.report import SitlReport, flags_of, judge
+from tools.sitl.setup import parameters
 from tools.sitl.world import FLOOR_Z_M, World
 from tools.steady import steady
 from tracker.errors import OperatorError
@@ -43,7 +46,7 @@ LOG, REPORT = "sitl.mcap", "report.json"
 FRAMES = ("heli",)
 OWN, ARDUPILOT = "the project's simulated autopilot", "ArduPilot"
 _RATE_HZ, _LONGEST_S = 15.0, 600.0
-_CAMERA_DELAY_NS = 30_000_000
+_CAMERA_DELAY_MS = 30
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,7 +117,8 @@ def fly(request: SitlRequest, clocks: Clocks, console: Console | None = None) ->
         aboard, flight, world = _set_up(request, settings, stack)
         faults = Faults(aboard.relay)
         world.told_aside_inW = lambda: faults.shift_inW
-        world.start(flight.plan(world, faults.rehearse(world, flight) if request.faults else iter(())))
+        rehearsal = faults.rehearse(world, flight) if request.faults else iter(())
+        world.start(chain(_looked_at(request, world, console), flight.plan(world, rehearsal)))
         watched = replace(clocks, wall=faults.wall_ns(clocks.wall))
         witness, outlets = _run(request, settings, world, faults, aboard.relay, watched, console, stack)
     report = SitlReport(
@@ -130,12 +134,22 @@ def fly(request: SitlRequest, clocks: Clocks, console: Console | None = None) ->
     return report
 
 
+def _looked_at(request: SitlRequest, world: World, console: Console) -> Iterator[None]:
+    """See that a program that somebody else started holds the parameters of the flight."""
+    if request.connect is None:
+        return
+    console.print(f"{request.connect}: taken; waiting for it to ask for physics", highlight=False)
+    yield
+    console.print(f"{request.connect}: it asks; waiting for its other port, reading its parameters", highlight=False)
+    yield from hold(world, parameters(_CAMERA_DELAY_MS), request.out / PARAMETERS)
+
+
 def _set_up(request: SitlRequest, settings: Settings, stack: ExitStack) -> tuple[Aboard, Flight, World]:
     """Start the autopilot and wire it up."""
     room_yaw_deg = settings.room.room_yaw_deg
     mission = Mission(request.mission_s, FLOOR_Z_M + Helicopter.skid_m)
     flight = Flight(mission, math.radians(room_yaw_deg))
-    given = Conditions(room_yaw_deg, home_of(settings), round(_CAMERA_DELAY_NS / 1e6), START_NS)
+    given = Conditions(room_yaw_deg, home_of(settings), _CAMERA_DELAY_MS, START_NS)
     if request.connect is not None:
         aboard = running(request.connect, request.out, given, flight.radio)
     elif request.binary is not None:
@@ -158,13 +172,14 @@ def _run(
     console: Console,
     stack: ExitStack,
 ) -> tuple[_Witness, Outlets]:
-    """Run the loop until the plan is done."""
+    """Run the loop until the plan is done; the one link is the relay's, in place of those the config names."""
+    settings = settings.with_links((f"udpout:127.0.0.1:{relay.bridge_port}",))
     rig = rig_of(settings, None).rig
-    timing = SimTiming(_RATE_HZ, _LONGEST_S, START_NS, delay_ns=_CAMERA_DELAY_NS)
+    timing = SimTiming(_RATE_HZ, _LONGEST_S, START_NS, delay_ns=1_000_000 * _CAMERA_DELAY_MS)
     source = stack.enter_context(SimSource(rig, world, clocks.stopwatch, timing, troubles=faults.troubles))
     witness = _Witness(tracker_of(settings, rig, clocks), world, faults)
     outlet = open_outlet(
-        terms_of(settings.with_links((f"udpout:127.0.0.1:{relay.bridge_port}",)), logged=True),
+        terms_of(settings, logged=True),
         component_id=settings.mavlink.component_id,
         room_yaw_deg=settings.room.room_yaw_deg,
         stopwatch=clocks.stopwatch,

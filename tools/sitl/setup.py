@@ -67,7 +67,12 @@ _SERVOS: Mapping[str, float] = {"SERVO8_MIN": 1000, "SERVO8_MAX": 2000}
 HELICOPTER: Mapping[str, float] = {**_SWASH, **_RATES, **_RADIO, **_SERVOS}
 
 
+def parameters(delay_ms: int) -> dict[str, float]:
+    """Return what the flight wants. delay_ms: least time from mid-exposure to arrival, VISO_DELAY_MS."""
+    return {**HELICOPTER, **VISION, "VISO_DELAY_MS": delay_ms}
+
+
 def parameter_file(delay_ms: int, extra: Mapping[str, float]) -> str:
-    """Return the text of a defaults file. delay_ms: least time from mid-exposure to arrival, VISO_DELAY_MS."""
-    values = {**HELICOPTER, **VISION, "VISO_DELAY_MS": delay_ms, **extra}
+    """Return the text of a defaults file; `extra` outweighs what the flight wants."""
+    values = {**parameters(delay_ms), **extra}
     return "".join(f"{name} {value:g}\n" for name, value in values.items())

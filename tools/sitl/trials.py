@@ -11,17 +11,17 @@ from rich.console import Console
 from rich.table import Table
 
 from bridge.settings import load_settings
+from tools.sitl.command import WIDTH
 from tools.sitl.mistakes import MISTAKES, Mistake
 from tools.sitl.trial import Trial, attempt
 
 RESULTS = "mistakes.json"
-_WIDTH = 120
 
 
 def run_trials(binary: Path | None, config: str, out: Path, mistakes: Sequence[Mistake] = MISTAKES) -> list[Trial]:
     """Try mistakes, print what came of them on stdout, and leave it in the folder. See `attempt`."""
     settings, console = load_settings(config), Console()
-    console.width = max(console.width, _WIDTH)
+    console.width = max(console.width, WIDTH)
     out.mkdir(parents=True, exist_ok=True)
     trials = []
     for number, mistake in enumerate(mistakes):

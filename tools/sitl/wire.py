@@ -71,10 +71,7 @@ class TcpWire:
         try:
             self._socket = socket.create_connection((host, port), _PATIENCE_S)
         except OSError as error:
-            raise OperatorError(
-                f"--connect: nobody listens at tcp:{host}:{port} ({error.strerror or error}); "
-                "start ArduPilot's SITL first, as docs/sitl.md says"
-            ) from error
+            raise OperatorError(f"nobody listens at tcp:{host}:{port} ({error.strerror or error})") from error
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
         self._socket.setblocking(False)
 

@@ -75,7 +75,7 @@ def make_batch(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig)
     h, H = pixels(state.mean, T, cameras, balls, lags_s, camera_table(rig), points_inB)
     true_lags_s = lags_s + state.offsets_s[cameras]
     R, A, B, path, doubt = _covariances(H, ahead.P_coasted, ahead.dt, T, covs_px, state.noise, cameras, true_lags_s)
-    if ahead.pivot_inB.any():
+    if ahead.turn_open:
         A += sag_noise(H, balls, points_inB, state.mean, state.P)
     return Batch(sightings, z, R, cameras, balls, lags_s, z - h, A, B, path, doubt, variances(ahead.process)[:, -1])
 

@@ -11,13 +11,11 @@ state goes in, a new state comes out.
 
 from __future__ import annotations
 
-from copy import copy
 from dataclasses import dataclass
-from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
-from filterpy.kalman import ExtendedKalmanFilter
+from filterpy.kalman import update as kalman_update
 
 from tracker.filter.batch import Batch, make_batch
 from tracker.filter.fit import Fit, fit
@@ -131,15 +129,6 @@ def _left_out(sighting: BallSighting, rig: Rig, distance2: float, where: str) ->
 
 def _posterior(prior: State, best: Fit) -> State:
     """Take the likeliest state, and the covariance of one linear step there from the prior, by filterpy."""
-    rows = len(best.y)
-    filter_ = copy(_blank_filter(len(best.P), rows))
-    filter_.P = best.P
-    filter_.update(best.y[:, None], lambda _: best.H, lambda _: np.zeros((rows, 1)), R=best.R)
-    mean, P, noise = settled(prior.mean, best.dx, filter_.P, prior.noise, best.batch.cameras, best.u, best.inverse)
+    _, P_after = kalman_update(np.zeros((len(best.P), 1)), best.P, best.y[:, None], best.R, best.H)
+    mean, P, noise = settled(prior.mean, best.dx, P_after, prior.noise, best.batch.cameras, best.u, best.inverse)
     return prior.at_mean(prior.t_ns, mean, P, best.levels, noise)
-
-
-@lru_cache(maxsize=256)
-def _blank_filter(size: int, rows: int) -> ExtendedKalmanFilter:
-    """Return a filter whose state is 0, to be copied: filterpy takes long to make one, and never changes its arrays."""
-    return ExtendedKalmanFilter(dim_x=size, dim_z=rows)

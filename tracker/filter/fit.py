@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -71,7 +72,7 @@ def fit(ahead: Prediction, batch: Batch, rig: Rig, *, adapt: bool = True) -> Fit
     tilt = 2.0 * process.tilt_rad**2 * process.tilt_s / max(ahead.dt, SHORTEST_S)
     levels, P, R, doubtful = _prepared(
         ahead.state.levels, manoeuvre.variances(process), batch.y, batch.A, batch.B, batch.R, batch.path, batch.doubt,
-        ahead.P_coasted, ahead.dt, process.manoeuvre_s, tilt, adapt, bool(ahead.pivot_inB.any()),
+        ahead.P_coasted, ahead.dt, process.manoeuvre_s, tilt, adapt, ahead.turn_open,
     )  # fmt: skip
     agreed = _fitted(ahead, batch, rig, levels, P, R)
     if not doubtful:
@@ -125,14 +126,14 @@ def _fitted(ahead: Prediction, batch: Batch, rig: Rig, levels: Array, P: Array, 
     """Fit with a given prior covariance P and noise R, which is not kept; None when the fit runs away."""
     n, R = len(batch.z), R.copy()
     dx, y, H, variances = _solve(ahead, batch, rig, P, R)
-    if not np.isfinite(dx).all():
+    if not math.isfinite(dx @ dx):
         return None
-    if float(variances[ATTITUDE].max()) > LEAST_OPEN_TURN_RAD**2 / 3.0:
+    if max(variances[ATTITUDE].tolist()) > LEAST_OPEN_TURN_RAD**2 / 3.0:
         bend_px = _bend(ahead, batch, rig, dx, P, H, R)
         if bend_px is not None:
             R[:n, :n] += np.outer(bend_px, bend_px)
             dx, y, H, variances = _solve(ahead, batch, rig, P, R)
-            if not np.isfinite(dx).all():
+            if not math.isfinite(dx @ dx):
                 return None
     u, inverse, nis = weighed(y, H, P, R)
     return Fit(batch, dx, P, levels, y, H, R, u, inverse, nis)

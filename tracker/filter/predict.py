@@ -32,9 +32,14 @@ class Prediction:
     process: Process
     pivot_inB: Array = field(default_factory=lambda: np.zeros(3))
 
+    @property
+    def turn_open(self) -> bool:
+        """Say whether a turn about the pivot was open."""
+        return bool(np.count_nonzero(self.pivot_inB))
+
     def about_pivot(self) -> Prediction:
         """Return the same prediction, its state and covariances told of the pivot instead of the origin."""
-        if not self.pivot_inB.any():
+        if not self.turn_open:
             return self
         mean, P, P_coasted = _told_of(self.state.mean, self.pivot_inB, self.state.P, self.P_coasted)
         state = self.state.at_mean(self.state.t_ns, mean, P, self.state.levels, self.state.noise)
@@ -108,7 +113,7 @@ def first_guess(state: State, process: Process) -> Prediction:
 
 def at_origin(state: State, pivot_inB: Array) -> State:
     """Return a state that is told of a point of the body as that of the body's origin."""
-    if not pivot_inB.any():
+    if not np.count_nonzero(pivot_inB):
         return state
     mean, P, _ = _told_of(state.mean, -pivot_inB, state.P, state.P)
     return state.at_mean(state.t_ns, mean, P, state.levels, state.noise)

@@ -14,7 +14,7 @@ from typing import NamedTuple
 from tracker.camera import Camera
 from tracker.image.appearance import BEARING_STEP_RAD, Appearance
 from tracker.image.light import Light
-from tracker.image.template import Template, draw, sampling_of, steps_of
+from tracker.image.template import SMALL_PX, Template, draw, sampling_of, steps_of
 from tracker.image.view import RADIUS, RAY_X, RAY_Y
 
 KEPT = 256  # templates, of about 100 kB each: what a flight through a room shows
@@ -43,6 +43,7 @@ class Album:
         self.draws_left: int | None = None
         self._camera = camera
         self._serving: dict[tuple[int, int], tuple[Wanted, Template]] = {}  # by ball and side of the box
+        self._as_wanted: dict[int, tuple[tuple[object, ...], tuple[Template, Template]]] = {}  # by ball, no neighbours
         self._drawn: dict[Wanted, Template] = {}
 
     def serve(self, ball: int, view: Sequence[float], appearance: Appearance) -> tuple[Template, Template]:
@@ -50,15 +51,24 @@ class Album:
 
         view: a row of `view.expected_views`.
         """
-        r, x_steps, y_steps = appearance.response, 0, 0
-        if appearance.shown.count:
+        r, shown, radius_px = appearance.response, appearance.shown, view[RADIUS]
+        x_steps = y_steps = 0
+        if shown.count:
             x_steps, y_steps = round(view[RAY_X] / BEARING_STEP_RAD), round(view[RAY_Y] / BEARING_STEP_RAD)
-        templates = []
-        for group, (blur_px, box_px) in enumerate(((r.luma_px, 1), (r.chroma_px, r.block_px))):
-            per_px = sampling_of(view[RADIUS], box_px)
-            wanted = Wanted(*steps_of(view[RADIUS], blur_px), x_steps, y_steps, box_px, per_px, appearance.shown)
-            templates.append(self._template((ball, group), wanted, view, appearance))
-        return templates[0], templates[1]
+        radius_steps, luma_steps = steps_of(radius_px, r.luma_px)
+        _, chroma_steps = steps_of(radius_px, r.chroma_px)
+        steps = radius_steps, luma_steps, chroma_steps, x_steps, y_steps, r.block_px, radius_px < SMALL_PX, shown
+        before = self._as_wanted.get(ball)
+        if before is not None and before[0] == steps:
+            return before[1]
+        box_px, bearing = r.block_px, (x_steps, y_steps)
+        luma = Wanted(radius_steps, luma_steps, *bearing, 1, sampling_of(radius_px, 1), shown)
+        chroma = Wanted(radius_steps, chroma_steps, *bearing, box_px, sampling_of(radius_px, box_px), shown)
+        slots = (ball, 0), (ball, 1)
+        pair = self._template(slots[0], luma, view, appearance), self._template(slots[1], chroma, view, appearance)
+        if self._serving[slots[0]][0] == luma and self._serving[slots[1]][0] == chroma:
+            self._as_wanted[ball] = steps, pair
+        return pair
 
     def _template(
         self, slot: tuple[int, int], wanted: Wanted, view: Sequence[float], appearance: Appearance

@@ -10,11 +10,11 @@ from tracker.image.appearance import MISFIT_MAX
 from tracker.image.look import Fitted, Look, look_near
 from tracker.image.rivals import first_rivals
 from tracker.image.sight import MISFIT
-from tracker.image.tint import Gains, Tint, core_colour
+from tracker.image.tint import Bgr, Gains, Tint, core_colour
 from tracker.image.view import RADIUS, unknown_streak_px
 from tracker.rig import Rig
 from tracker.state import State
-from tracker.types import Array, Frame
+from tracker.types import Frame
 
 LIGHT_BALLS = 2  # a single ball that is something else would tell of a light that is not there
 LEARN_ALL = 72  # balls of each camera; then
@@ -34,6 +34,15 @@ class Eyes:
         self._tints = [Tint() for _ in rig.cameras]
         self._turn = 0
         self._taught_blindly = False
+        self._sum_up()
+
+    def _sum_up(self) -> None:
+        """Take note of what is known by now: asked for in every round, it changes with lessons alone."""
+        self._appearances = [rivals.best for rivals in self._rivals]
+        self._exposures_s = tuple([appearance.response.exposure_s for appearance in self._appearances])
+        self._gamma_known = all(rivals.settled for rivals in self._rivals)
+        enough = all(appearance.light.count >= LEARN_ALL for appearance in self._appearances)
+        self._settled = self._gamma_known and enough  # how balls look is known, so that little is left to learn
 
     def stand(self, rig: Rig) -> None:
         """Take the cameras to stand elsewhere."""
@@ -47,12 +56,7 @@ class Eyes:
     @property
     def exposure_s(self) -> float:
         """Return how long the slowest shutter stands open, as learned [s]."""
-        return max(rivals.best.response.exposure_s for rivals in self._rivals)
-
-    @property
-    def _settled(self) -> bool:
-        """Say whether it is known how balls look, so that little is left to learn."""
-        return all(rivals.settled and rivals.best.light.count >= LEARN_ALL for rivals in self._rivals)
+        return max(self._exposures_s)
 
     @property
     def gains(self) -> tuple[Gains, ...]:
@@ -72,17 +76,18 @@ class Eyes:
         whose = frames[self._turn % len(frames)].camera  # of those that see now: free-running ones are a round each
         for index, album in enumerate(self._albums):
             album.draws_left = int(index == whose) if self._settled else None
-        look = look_near(frames, self._rig, state, [rivals.best for rivals in self._rivals], self._albums, self.gains)
-        doubt_px = SMEAR_DOUBT * self._streak_px(state)
-        return look.doubted(doubt_px) if doubt_px > SMEAR_DOUBT * BLIND_PX else look
+        look = look_near(frames, self._rig, state, self._appearances, self._albums, self.gains)
+        smear_px = self._smear_px(state)
+        look.blind = smear_px > BLIND_PX
+        return look.doubted(SMEAR_DOUBT * smear_px) if look.blind else look
 
     def blind(self, state: State) -> bool:
         """Say whether a state does not know how far the balls' images are smeared."""
-        return self._streak_px(state) > BLIND_PX
+        return self._smear_px(state) > BLIND_PX
 
-    def _streak_px(self, state: State) -> float:
+    def _smear_px(self, state: State) -> float:
         """Return one sigma of how far the balls' images may be smeared that the state does not know of [px]."""
-        return unknown_streak_px(state, self._rig, [rivals.best.response.exposure_s for rivals in self._rivals])
+        return unknown_streak_px(state, self._rig, self._exposures_s)
 
     def learn(self, fitted: Sequence[Fitted], *, blindly: bool) -> None:
         """Learn how balls look: from every one at first, then from one in turn every few rounds.
@@ -95,13 +100,17 @@ class Eyes:
             self._taught_blindly = False
             if any(one.streak_px > LONG_STREAK_PX for one in fitted):
                 self._rivals = [first_rivals() for _ in self._rig.cameras]
-        self._taught_blindly |= blindly and not all(rivals.settled for rivals in self._rivals)
+                self._sum_up()
+        self._taught_blindly |= blindly and not self._gamma_known
         if self._settled:
-            fitted = [fitted[self._turn // LEARN_EVERY % len(fitted)]] if self._turn % LEARN_EVERY == 0 else []
+            if self._turn % LEARN_EVERY:
+                return
+            fitted = [fitted[self._turn // LEARN_EVERY % len(fitted)]]
         for one in fitted:
             index = one.frame.camera
             camera, image = self._rig.cameras[index], one.frame.image
             self._rivals[index] = self._rivals[index].learned(image, camera, one.expected(camera), one.centre)
+        self._sum_up()
 
     def _follow_the_light(self, fitted: Sequence[Fitted]) -> None:
         """Learn the light from the balls' colours: of each camera at first, then of those that see now in turn."""
@@ -114,6 +123,6 @@ class Eyes:
                 self._tints[camera] = self._tints[camera].learned([(one.sighting.ball, _colour(one)) for one in seen])
 
 
-def _colour(one: Fitted) -> Array:
+def _colour(one: Fitted) -> Bgr:
     u, v = one.sighting.uv_px.tolist()
     return core_colour(one.frame.image, u, v, one.view[RADIUS])

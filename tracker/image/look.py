@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from tracker.camera import Camera
 from tracker.image.album import Album
 from tracker.image.appearance import Appearance
 from tracker.image.centre import Centre
-from tracker.image.colour_table import colours_of
+from tracker.image.colour_table import colours_of_each
 from tracker.image.detect import Blob, find_blobs
 from tracker.image.patch import Expected
 from tracker.image.sight import COV, MISFIT, SIZE, SPOT, UV, find_ball, known_of
@@ -59,19 +59,23 @@ class Fitted:
         return Centre(self.fit[UV], self.fit[COV].reshape(2, 2), float(self.fit[MISFIT]))
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True, eq=False)
 class Look:
-    """What the images of one instant gave, and what was left out."""
+    """What the images of one instant gave, and what was left out.
 
-    fitted: tuple[Fitted, ...]
-    rejections: tuple[Rejected, ...]
+    blind: it was not known how far the balls' images are smeared.
+    """
+
+    fitted: list[Fitted] = field(default_factory=list)
+    rejections: list[Rejected] = field(default_factory=list)
+    blind: bool = False
 
     def doubted(self, sigma_px: float) -> Look:
         """Return it with sightings that are less sure, by one sigma on each axis [px]."""
         more = sigma_px**2 * np.eye(2)
         doubted = (replace(one.sighting, cov_px=frozen_array(one.sighting.cov_px + more)) for one in self.fitted)
-        fitted = tuple(replace(one, sighting=sighting) for one, sighting in zip(self.fitted, doubted, strict=True))
-        return Look(fitted, self.rejections)
+        fitted = [replace(one, sighting=sighting) for one, sighting in zip(self.fitted, doubted, strict=True)]
+        return Look(fitted, self.rejections, self.blind)
 
 
 def look_near(
@@ -90,40 +94,39 @@ def look_near(
         appearances, albums: how balls look to each camera of the rig, and their templates.
         gains: of the light in each camera; none for the config's light.
     """
-    fitted: list[Fitted] = []
-    rejections: list[Rejected] = []
+    look = Look()
     for frame in frames:
         c = frame.camera
-        light = gains[c] if gains else NEUTRAL
-        for found in _balls_of(frame, rig, state, appearances[c], albums[c], light):
-            if isinstance(found, Rejected):
-                rejections.append(found)
-            else:
-                fitted.append(found)
-    return Look(tuple(fitted), tuple(rejections))
+        _find_balls(frame, rig, state, appearances[c], albums[c], gains[c] if gains else NEUTRAL, look)
+    return look
 
 
-def _balls_of(
-    frame: Frame, rig: Rig, state: State, appearance: Appearance, album: Album, gains: Gains
-) -> Iterator[Fitted | Rejected]:
-    """Yield each ball of the marker as seen near its prediction, or why it is not."""
-    rows = expected_views(state, rig, frame.camera, frame.t_ns)
-    known, fits = known_of(appearance.response), np.empty((len(rows), SIZE))
+def _find_balls(
+    frame: Frame, rig: Rig, state: State, appearance: Appearance, album: Album, gains: Gains, look: Look
+) -> None:
+    """Add each ball of the marker as seen in one image near its prediction, or why it is not."""
+    image, camera, t_ns, balls = frame.image, frame.camera, frame.t_ns, rig.marker.balls
+    eye = rig.cameras[camera]
+    rows, known, colours = (
+        expected_views(state, rig, camera, t_ns), known_of(appearance.response), colours_of_each(balls, gains)
+    )  # fmt: skip
+    fits = np.empty((len(rows), SIZE))
     fixed = fits.view()
     fixed.flags.writeable = False
-    for b, (ball, view) in enumerate(zip(rig.marker.balls, rows.tolist(), strict=True)):
+    uvs_px, covs_px2 = fixed[:, UV], fixed[:, COV].reshape(-1, 2, 2)
+    for b, view in enumerate(rows.tolist()):
         if not (math.isfinite(view[U]) and math.isfinite(view[V]) and view[DEPTH] >= NEAREST_M):
-            yield Rejected(Reason.BEHIND, f"{ball.name} is not before the camera", frame.t_ns, frame.camera)
+            look.rejections.append(Rejected(Reason.BEHIND, f"{balls[b].name} is not before the camera", t_ns, camera))
             continue
         drawn = album.serve(b, view, appearance)
-        failed = find_ball(frame.image, colours_of((ball,), gains), rows[b], known, drawn, fits[b])
-        if failed is not None:
-            detail = f"no {ball.name} at ({view[U]:.0f}, {view[V]:.0f}) px, where it is expected"
-            yield Rejected(failed, detail, frame.t_ns, frame.camera)
+        failed = find_ball(image, colours[b], rows[b], known, drawn, fits[b])
+        if failed is None:
+            row_ns = t_ns + round(eye.delay_ns(fits[b, UV][1])) if eye.readout_ns else t_ns
+            sighting = BallSighting(camera, b, row_ns, uvs_px[b], covs_px2[b])
+            look.fitted.append(Fitted(sighting, frame, view, fixed[b], appearance, drawn))
         else:
-            fit = fixed[b]
-            sighting = BallSighting(frame.camera, b, frame.t_ns, fit[UV], fit[COV].reshape(2, 2))
-            yield Fitted(sighting, frame, view, fit, appearance, drawn)
+            detail = f"no {balls[b].name} at ({view[U]:.0f}, {view[V]:.0f}) px, where it is expected"
+            look.rejections.append(Rejected(failed, detail, t_ns, camera))
 
 
 def look_everywhere(frame: Frame, camera: Camera, rig: Rig, gains: Gains = NEUTRAL) -> list[list[Blob]]:

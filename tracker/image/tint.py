@@ -14,11 +14,9 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-import numpy as np
-
 from tracker.image.patch import CLIPPED
 from tracker.maths.compiled import compiled
-from tracker.types import Array, Image
+from tracker.types import Image
 
 CORE_SHARE = 0.6  # of the radius: further out the background shines in
 UNITY = 16  # of the fixed point that pixels are multiplied in: a colour's box is far wider than a sixteenth
@@ -32,6 +30,7 @@ _STEPS = range(-RINGS, RINGS + 1)
 AROUND = sorted(((b, r) for b in _STEPS for r in _STEPS if b or r), key=lambda at: (at[0] ** 2 + at[1] ** 2, at))
 """Steps of blue and red to lights round the known one, the nearest first."""
 LEAST_LEVEL = 4.0  # grey levels: a channel darker than that tells nothing
+Bgr = tuple[float, float, float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,11 +70,11 @@ class Tint:
         """Say whether the own colour of every ball seen so far is known."""
         return bool(self.colours) and all(count >= LEARN_BALLS for *_, count in self.colours.values())
 
-    def learned(self, seen: Sequence[tuple[int, Array]]) -> Tint:
+    def learned(self, seen: Sequence[tuple[int, Bgr]]) -> Tint:
         """Return what is known after one image.
 
         Args:
-            seen: ball and mean colour (3,) BGR of its core, from `core_colour`, for each ball well fitted.
+            seen: ball and mean colour of its core, from `core_colour`, for each ball well fitted.
         """
         here = math.log(self.gains.blue), math.log(self.gains.red)
         colours = dict(self.colours)
@@ -112,34 +111,34 @@ def _followed(here: float, seen: float) -> float:
     return max(-MOST_LOG, min(MOST_LOG, here + FOLLOW_SHARE * (seen - here)))
 
 
-def _ratios(bgr: Array) -> tuple[float, float, float] | None:
+def _ratios(bgr: Bgr) -> tuple[float, float, float] | None:
     """Return weight, log(blue / green) and log(red / green) of a colour; None where a channel is too dark to tell.
 
     Source: to first order log x errs by noise / x, so the weight is the square of the darkest channel.
     """
-    blue, green, red = (float(level) for level in bgr)
+    blue, green, red = bgr
     darkest = min(blue, green, red)
     if not darkest >= LEAST_LEVEL:
         return None
     return darkest * darkest, math.log(blue / green), math.log(red / green)
 
 
-@compiled("f8[::1](Array(u1, 3, 'C', readonly=True), f8, f8, f8)")
-def core_colour(image: Image, u: float, v: float, radius_px: float) -> Array:
-    """Return the mean colour (3,) BGR of the middle of a ball, clipped pixels left out; NaN where all are.
+@compiled("UniTuple(f8, 3)(Array(u1, 3, 'C', readonly=True), f8, f8, f8)")
+def core_colour(image: Image, u: float, v: float, radius_px: float) -> Bgr:
+    """Return the mean colour of the middle of a ball, clipped pixels left out; NaN where all are.
 
     Args:
         image: (height, width, 3) BGR.
         u, v: the ball's centre.  radius_px: its radius [px].
     """
     reach = max(CORE_SHARE * radius_px, 0.8)
-    total, count = np.zeros(3), 0
+    blue = green = red = 0.0
+    count = 0
     for row in range(max(0, math.ceil(v - reach)), min(image.shape[0], math.floor(v + reach) + 1)):
         for column in range(max(0, math.ceil(u - reach)), min(image.shape[1], math.floor(u + reach) + 1)):
             pixel = image[row, column]
             if (column - u) ** 2 + (row - v) ** 2 > reach**2 or max(pixel[0], pixel[1], pixel[2]) >= CLIPPED:
                 continue
-            for k in range(3):
-                total[k] += pixel[k]
+            blue, green, red = blue + pixel[0], green + pixel[1], red + pixel[2]
             count += 1
-    return total / count
+    return blue / count, green / count, red / count

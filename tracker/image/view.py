@@ -7,6 +7,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from tracker.camera import Camera
 from tracker.filter.measure import camera_table, marker_points, pixels
 from tracker.maths.compiled import compiled
 from tracker.rig import Rig
@@ -33,8 +34,23 @@ def expected_views(state: State, rig: Rig, camera: int, t_ns: int) -> Array:
         (RAY_X, RAY_Y, 1) in C; and its DEPTH before the camera [m], these by the state's own time.
     """
     lag_s = (t_ns - state.t_ns) * 1e-9
-    table, points, focal_px = camera_table(rig), marker_points(rig), rig.cameras[camera].focal_px
-    return _views(state.mean, state.manoeuvre_s, state.P, camera, lag_s, table, points, _radii(rig), focal_px)
+    table, points, seen_by = camera_table(rig), marker_points(rig), rig.cameras[camera]
+    radii_m, focal_px = _radii(rig), seen_by.focal_px
+    views = _views(state.mean, state.manoeuvre_s, state.P, camera, lag_s, table, points, radii_m, focal_px)
+    return _rolled(views, seen_by) if seen_by.readout_ns else views
+
+
+def _rolled(views: Array, camera: Camera) -> Array:
+    """Carry each ball on to the time when a rolling shutter comes to it.
+
+    Source: with s seconds a row, ball and shutter meet at the row v' = v + v_dot s (v' - middle): one linear equation.
+        A vehicle would have to be seen falling faster than the shutter to have none.
+    """
+    row_s, middle = camera.row_ns * 1e-9, (camera.height_px - 1) / 2.0
+    late_s = row_s * (views[:, V] - middle) / np.maximum(1.0 - row_s * views[:, SPEED_V], 0.1)
+    views[:, U] += late_s * views[:, SPEED_U]
+    views[:, V] += late_s * views[:, SPEED_V]
+    return views
 
 
 @compiled("void(f8[::1], f8[::1], f8[::1], f8[::1])")
@@ -100,11 +116,16 @@ def _reach_m(rig: Rig) -> float:
     return float(np.linalg.norm(points - points.mean(axis=0), axis=1).max())
 
 
-def unknown_streak_px(state: State, rig: Rig, exposures_s: list[float]) -> float:
+@lru_cache(maxsize=64)
+def _seconds_by_px(rig: Rig, exposures_s: tuple[float, ...]) -> Array:
+    """Return each camera's exposure by its focal length [s px]."""
+    return np.array([camera.focal_px * s for camera, s in zip(rig.cameras, exposures_s, strict=True)])
+
+
+def unknown_streak_px(state: State, rig: Rig, exposures_s: tuple[float, ...]) -> float:
     """Return one sigma of how far the balls' images may be smeared that a state does not know of [px].
 
     exposures_s: of each camera.
     """
-    scaled = [camera.focal_px * s for camera, s in zip(rig.cameras, exposures_s, strict=True)]
     x, y, z = state.p_BinW.tolist()
-    return _smear((x, y, z), state.P, camera_table(rig), np.array(scaled), _reach_m(rig))
+    return _smear((x, y, z), state.P, camera_table(rig), _seconds_by_px(rig, exposures_s), _reach_m(rig))

@@ -12,10 +12,13 @@ from tracker.rig import Rig
 from tracker.scene import Look, SceneRenderer, Trouble
 from tracker.sources.paths import Pose, Vehicle
 from tracker.sources.protocol import ClosesOnExit, Stopwatch
-from tracker.types import Event, Frame
+from tracker.types import Event, Frame, Image
 
 START_NS = 1_000_000_000
 """Stream time of a simulation's first frame [ns]: not zero, which some autopilots read as `unknown`."""
+
+NEAR_M = 0.04  # from a ball's centre: the ball, and how far it may go while half the picture is read out
+BAND_PX = 2  # rows that a simulated rolling shutter exposes together: of 480 in 20 ms, within 0.1 ms
 
 Troubles = Callable[[int, int], Trouble]
 """What spoils the picture of a camera (index) at a time [ns]."""
@@ -105,6 +108,7 @@ class SimSource(ClosesOnExit):
         self._times = self._timing.times(self.camera_count)
         self._renderer = SceneRenderer(rig, self._look, seed)
         self._troubles = troubles or _no_trouble
+        self._points_inB = rig.marker.points_inB
         self._closed = False
 
     def __iter__(self) -> Iterator[Event]:
@@ -123,11 +127,31 @@ class SimSource(ClosesOnExit):
         self._closed = True
 
     def _frame(self, t_ns: int, camera: int) -> Frame:
-        poses = [self._vehicle.pose_at(t_ns + after_ns) for after_ns in self._shutter_ns()]
-        image = self._renderer.render(camera, poses, self._troubles(camera, t_ns))
+        image = self._exposed(t_ns, camera, t_ns)
+        if self.cameras[camera].readout_ns:
+            image = self._rolled(t_ns, camera, image)
         image.flags.writeable = False
         self._vehicle.pose_at(t_ns + self._timing.delay_ns)
         return Frame(camera, t_ns, image, self._stopwatch())
+
+    def _exposed(self, t_ns: int, camera: int, row_ns: int) -> Image:
+        """Render the picture of a frame with every row exposed round one time [ns]."""
+        poses = [self._vehicle.pose_at(row_ns + after_ns) for after_ns in self._shutter_ns()]
+        return self._renderer.render(camera, poses, self._troubles(camera, t_ns))
+
+    def _rolled(self, t_ns: int, camera: int, image: Image) -> Image:
+        """Read a picture out as a rolling shutter does: round each ball, every band of rows at its own time."""
+        eye, (p_BinW, R_BtoW) = self.cameras[camera], self._vehicle.pose_at(t_ns)
+        points_inW = self._points_inB @ R_BtoW.T + p_BinW
+        reach_px = NEAR_M * eye.focal_px / np.abs(eye.in_camera(points_inW)[:, 2])
+        rows = eye.project(points_inW)[0][:, 1]
+        rolled = image.copy()
+        for top in range(0, eye.height_px, BAND_PX):
+            if (np.abs(rows - top) < reach_px).any():
+                band = slice(top, top + BAND_PX)
+                row_ns = t_ns + round(eye.delay_ns(top + (BAND_PX - 1) / 2.0))
+                rolled[band] = self._exposed(t_ns, camera, row_ns)[band]
+        return rolled
 
     def _shutter_ns(self) -> list[int]:
         """Return the sub-exposures' times from mid-exposure [ns], each the middle of an equal part."""

@@ -40,7 +40,8 @@ def first_state(seen: Seen, rig: Rig, process: Process) -> State | Rejected:
     newest_ns = max(times)
     if len(seen) < 2:
         return Rejected(Reason.NOT_FOUND, "one camera alone cannot start a track", newest_ns)
-    slack_m = ((newest_ns - min(times)) * 1e-9 + process.clock_offset_s) * process.initial_speed_m_s
+    apart_ns = newest_ns - min(times) + max(abs(rig.cameras[camera].readout_ns) for camera in seen)
+    slack_m = (apart_ns * 1e-9 + process.clock_offset_s) * process.initial_speed_m_s
     points = [_places(ball, seen, rig, slack_m) for ball in range(len(rig.marker))]
     chosen = associate(points, rig.marker, slack_m)
     if isinstance(chosen, Rejected):

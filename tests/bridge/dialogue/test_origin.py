@@ -135,3 +135,11 @@ def test_after_a_reboot_it_is_told_again() -> None:
     pilot.fly(5.0)
     assert len(pilot.told) == 2
     assert pilot.settled()
+
+
+def test_a_px4_is_told_altitude_0_since_its_height_would_jump_by_any_other() -> None:
+    far = Autopilots(OriginKeeper(PLACE))
+    far.fly(3.0, Peer(1, 1, Autopilot.PX4))
+    (told,) = far.told
+    assert told.name == "SET_GPS_GLOBAL_ORIGIN"
+    assert (told.fields["latitude"], told.fields["altitude"]) == (321_000_000, 0)

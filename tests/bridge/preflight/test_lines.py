@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from bridge.dialogue.timesync import SyncState
 from bridge.preflight.ardupilot import rules
 from bridge.preflight.budget import LINK, STAMPS, budget_of, recommended_ms
 from bridge.preflight.far_end import origin_line, port_line, port_note, who_lines
+from bridge.preflight.fusion import fusion_lines
 from bridge.preflight.hearing import Hearing
 from bridge.preflight.parameters import Parameter
 from bridge.preflight.poses import PoseWatch, Timing
@@ -35,7 +38,7 @@ STATUS = "EKF_STATUS_REPORT"
 
 def heard(*messages: Received) -> Hearing:
     """Return a hearing that took these messages."""
-    hearing = Hearing((POSITION, ATTITUDE, STATUS, "COMMAND_ACK"))
+    hearing = Hearing((POSITION, ATTITUDE, STATUS, "ESTIMATOR_STATUS", "COMMAND_ACK"))
     for message in messages:
         hearing.take(message, HELI)
     return hearing
@@ -170,6 +173,50 @@ def test_an_origin_counts_only_once_the_global_position_proves_it() -> None:
     assert origin_line(STATE, heard(place), True).mark is Mark.PASS
     assert origin_line(STATE, heard(nowhere, position), True).mark is Mark.FAIL
     assert origin_line(STATE, heard(nowhere), True).mark is Mark.UNKNOWN
+
+
+@pytest.mark.parametrize(
+    ("altitude_m", "version", "mark"),
+    [(489.0, (1, 16), Mark.FAIL), (489.0, (1, 15), Mark.PASS), (0.0, (1, 17), Mark.PASS), (489.0, None, Mark.FAIL)],
+)
+def test_an_origin_whose_altitude_a_px4_would_climb_by_is_refused(
+    altitude_m: float, version: tuple[int, int] | None, mark: Mark
+) -> None:
+    state = replace(STATE, peer=Peer(1, 1, Autopilot.PX4), profile="px4", origin="")
+    place = from_autopilot("GPS_GLOBAL_ORIGIN", 1, latitude=473_977_420, altitude=round(1e3 * altitude_m))
+    told = [place]
+    if version is not None:
+        number = version[0] << 24 | version[1] << 16
+        told.append(from_autopilot("AUTOPILOT_VERSION", 1, flight_sw_version=number))
+    assert origin_line(state, heard(*told), configured=True).mark is mark
+
+
+@pytest.mark.parametrize(
+    ("flags", "mark"),
+    [
+        (0x1FF, Mark.PASS),  # at rest on the ground with poses
+        (0x17F, Mark.PASS),  # in flight
+        (0xE5, Mark.FAIL),  # without poses
+        (0x7F, Mark.FAIL),  # in flight, poses gone a second ago
+    ],
+)
+def test_the_flags_that_a_real_px4_showed_are_read_rightly(flags: int, mark: Mark) -> None:
+    report = from_autopilot("ESTIMATOR_STATUS", SECOND_NS, flags=flags)
+    lines = by_what(fusion_lines(heard(report), [], SYNC, Autopilot.PX4, 0))
+    assert lines["filter"].mark is mark
+
+
+def test_a_filter_without_a_position_innovation_is_not_a_good_one() -> None:
+    report = from_autopilot("ESTIMATOR_STATUS", SECOND_NS, vel_ratio=math.nan, pos_horiz_ratio=math.nan)
+    line = by_what(fusion_lines(heard(report), [], SYNC, Autopilot.PX4, 0))["innovations"]
+    assert (line.mark, line.found) == (Mark.UNKNOWN, "v none, xy none, z 0.00, yaw 0.00")
+
+
+def test_a_px4_that_would_not_arm_and_gives_no_reason_is_no_pass() -> None:
+    (line,) = said([], asked=True, answered=True, ready=False).lines
+    assert (line.mark, line.found) == (Mark.WARN, "it will not arm, and says no reason here")
+    (line,) = said([], asked=True, answered=True, ready=True).lines
+    assert line.mark is Mark.PASS
 
 
 def test_a_slow_port_is_told_where_it_may_matter() -> None:

@@ -5,6 +5,7 @@ Stands where the simulated autopilot stands in a rehearsal.
 
 from __future__ import annotations
 
+import math
 import struct
 from collections.abc import Mapping
 
@@ -24,6 +25,10 @@ RIGHT: Mapping[str, float | int] = {
     "SYS_HAS_GPS": 0, "SYS_HAS_MAG": 0, "EKF2_EV_QMIN": 0, "EKF2_EV_NOISE_MD": 0, "EKF2_EVP_NOISE": 0.05,
     "EKF2_EVV_NOISE": 0.05, "EKF2_EVA_NOISE": 0.05, "MAV_1_CONFIG": 102, "SER_TEL2_BAUD": 921600,
 }  # fmt: skip
+FUSING: Mapping[str, FieldValue] = {"flags": 0x1FF, "vel_ratio": 0.05}
+BLIND: Mapping[str, FieldValue] = {"flags": 0xE5, **dict.fromkeys(("vel_ratio", "pos_horiz_ratio"), math.nan)}
+"""ESTIMATOR_STATUS of PX4 1.17 at rest, as its own program sent it: with poses, and without."""
+
 _NAMES = {**NUMBERS} | {enum(f"MAVLINK_MSG_ID_{name}"): name for name in ("HIGHRES_IMU", "ESTIMATOR_STATUS")}
 
 
@@ -100,7 +105,7 @@ class StandIn:
             return {"time_usec": self._now_ns // 1000, **dict(zip(("xgyro", "ygyro", "zgyro"), rates, strict=True))}
         pose = self._pose if self.parameters[EV_CTRL] == ALL else None
         if name == "ESTIMATOR_STATUS":
-            return {"time_usec": self._now_ns // 1000, "flags": 0x1 if pose is None else 0x33F}
+            return {"time_usec": self._now_ns // 1000, **(BLIND if pose is None else FUSING)}
         if pose is None:
             return None
         if name == "LOCAL_POSITION_NED":

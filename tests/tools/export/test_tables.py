@@ -118,12 +118,14 @@ def test_pymavlinks_own_reader_reads_a_tlog_in_order_with_wall_clock_times(tmp_p
         sent = {"link": "udpout:127.0.0.1:14550", "t_ns": t_ns, "raw": raw}
         lines.append(Line("/mavlink/sent/HEARTBEAT", t_ns + 50 * MS, sent))
         late = received("/mavlink/received/HEARTBEAT", {}, -1, t_ns)
-        lines.append(Line(late.topic, t_ns + 80 * MS, late.value | {"raw": raw}))
+        lines.append(Line(late.topic, t_ns + 80 * MS, late.value | {"raw": raw, "link": "serial:/dev/ttyAMA0:921600"}))
     done = export(write(tmp_path / "a.mcap", lines), ExportTerms("tlog"), tmp_path / "a.tlog")
     connection = mavutil.mavlink_connection(str(tmp_path / "a.tlog"))
     messages = list(iter(lambda: connection.recv_match(type="HEARTBEAT"), None))
     connection.close()
     assert len(messages) == done.count == 60
+    assert {message._link for message in messages[::2]} == {1}
+    assert {message._link for message in messages[1::2]} == {0}
     stamps = [message._timestamp for message in messages]
     assert stamps == sorted(stamps)
     assert stamps[0] == pytest.approx(1_700_000_000.0, abs=1e-3)

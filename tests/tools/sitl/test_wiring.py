@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,12 +14,13 @@ from hypothesis import strategies as st
 from bridge.ned import rotation_from_room
 from tools.simulate.dynamics import GRAVITY
 from tools.simulate.helicopter import State, standing
+from tools.sitl.aboard import Conditions, running
 from tools.sitl.airframe import COLLECTIVE_DEG, COLLECTIVE_PWM, HOVER_DEG, VEHICLE, sticks_of
 from tools.sitl.lockstep import line_of
 from tools.sitl.process import Wiring, arguments
 from tools.sitl.relay import Relay
 from tools.sitl.setup import parameter_file
-from tools.sitl.wire import TcpWire, UdpWire
+from tools.sitl.wire import UdpWire
 from tracker.errors import OperatorError
 from tracker.maths import so3
 
@@ -122,6 +124,9 @@ def test_a_relay_passes_both_ways_and_loses_what_it_shall() -> None:
             each.close()
 
 
-def test_a_simulator_that_is_not_there_is_told_in_one_line() -> None:
-    with pytest.raises(OperatorError, match=r"nobody listens at tcp:127\.0\.0\.1:1 "):
-        TcpWire("127.0.0.1", 1)
+def test_a_simulator_that_is_not_there_is_told_in_one_line_with_the_file_to_start_it_with(tmp_path: Path) -> None:
+    given_ = Conditions(0.0, (47.0, 8.0, 400.0), 30, 10**9)
+    complaint = r"nobody listens at tcp:127\.0\.0\.1:1 .*--defaults (/.*vision\.parm)"
+    with pytest.raises(OperatorError, match=complaint):
+        running("tcp:127.0.0.1:1", tmp_path, given_, lambda: NO_RADIO)
+    assert (tmp_path / "vision.parm").read_text() == parameter_file(30, {})

@@ -10,17 +10,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tracker.image.tint import AROUND, LEARN_BALLS, NEUTRAL, UNITY, Gains, Tint, core_colour
-from tracker.types import Array
+from tracker.image.tint import AROUND, LEARN_BALLS, NEUTRAL, UNITY, Bgr, Gains, Tint, core_colour
 
 PAINTS = {0: np.array([46.0, 161.0, 166.0]), 1: np.array([52.0, 128.0, 43.0]), 2: np.array([36.0, 89.0, 165.0])}
 """Yellow, green, orange, BGR."""
 gain = st.floats(0.75, 1.35)
 
 
-def under(gains: Gains, brightness: float = 1.0) -> list[tuple[int, Array]]:
+def under(gains: Gains, brightness: float = 1.0) -> list[tuple[int, Bgr]]:
     """Return what each ball looks like in a light."""
-    return [(ball, brightness * bgr * (gains.blue, 1.0, gains.red)) for ball, bgr in PAINTS.items()]
+    seen = {ball: brightness * bgr * (gains.blue, 1.0, gains.red) for ball, bgr in PAINTS.items()}
+    return [(ball, (blue, green, red)) for ball, (blue, green, red) in seen.items()]
 
 
 def used_to(gains: Gains) -> Tint:
@@ -65,7 +65,7 @@ def test_a_light_known_from_elsewhere_is_no_part_of_the_balls_own_colours() -> N
 @pytest.mark.parametrize("level", [0.0, math.nan])
 def test_a_colour_with_a_black_channel_tells_nothing(level: float) -> None:
     tint = used_to(NEUTRAL)
-    assert tint.learned([(0, np.array([level, 120.0, 130.0]))]).gains == tint.gains
+    assert tint.learned([(0, (level, 120.0, 130.0))]).gains == tint.gains
 
 
 def test_absurd_gains_are_held_at_a_limit() -> None:

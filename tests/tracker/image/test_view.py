@@ -72,9 +72,9 @@ def test_a_streak_not_known_of_is_speeds_sigma_times_exposure_times_focal_length
     P = np.zeros((19, 19))
     P[6:9, 6:9] = sigma_m_s**2 * np.eye(3)
     now, camera = replace(state(), P=P), RIG.cameras[1]
-    one_open = unknown_streak_px(now, RIG, [0.0, 0.004])
+    one_open = unknown_streak_px(now, RIG, (0.0, 0.004))
     assert math.isclose(one_open, sigma_m_s * 0.004 * camera.focal_px / float(np.linalg.norm(camera.p_CinW)))
-    assert unknown_streak_px(now, RIG, [0.001, 0.004]) == one_open
+    assert unknown_streak_px(now, RIG, (0.001, 0.004)) == one_open
 
 
 def test_what_all_balls_share_shrinks_with_the_information_of_all_cameras() -> None:

@@ -83,6 +83,8 @@ def _table(camera: Camera) -> tomlkit.items.Table:
     table.add("T_CtoW", rows.multiline(True))
     if camera.clock_offset_ns:
         table.add("clock_offset_ms", camera.clock_offset_ns / 1e6)
+    if camera.readout_ns:
+        table.add("readout_ms", camera.readout_ns / 1e6)
     return table
 
 
