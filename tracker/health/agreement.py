@@ -24,7 +24,7 @@ DRIFT_M, DRIFT_RAD = 0.0003, math.radians(0.01)  # one sigma: what comes and goe
 KNOCK_M, KNOCK_RAD = 0.01, math.radians(0.5)  # one sigma of a camera that was knocked
 MOST_EVIDENCE = 7.4  # of one sample [nats]
 AT_ODDS = 15.0  # of all recent ones: more than two can give [nats]
-NAMED = 15.0  # by which it must be better than that against any other camera [nats]
+NAMED = 5.0  # by which a sample usually speaks more against one camera than against any other [nats]
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,12 +61,11 @@ class Agreement:
         self._older += 1
 
     def _odds(self) -> Odds:
-        totals = sorted(
-            (sum(min(evidence[camera], MOST_EVIDENCE) for _, evidence in self._recent), camera)
-            for camera in range(self._cameras)
-        )
-        (second, _), (best, suspect) = totals[-2:]
-        return Odds(best > AT_ODDS, suspect if best > AT_ODDS and best - second > NAMED else None)
+        evidence = np.array([each for _, each in self._recent])
+        at_odds = bool(np.minimum(evidence, MOST_EVIDENCE).sum(axis=0).max() > AT_ODDS)
+        usual = np.median(evidence, axis=0)
+        second, best = np.argsort(usual)[-2:].tolist()
+        return Odds(at_odds, best if at_odds and usual[best] - usual[second] > NAMED else None)
 
     def _evidence(self, sample: Sample) -> list[float]:
         """Return by how much each camera's knock explains a sample better than none [nats].
