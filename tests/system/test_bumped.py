@@ -93,7 +93,7 @@ def test_a_clean_flight_a_hand_and_a_lamp_are_no_bump(calm: Bump) -> None:
 
 @pytest.mark.parametrize("bump", [TURNED, ASIDE], ids=["turned", "aside"])
 def test_the_log_mends_the_camera(bump: Bump, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Its rays to the vehicle, by which its picture truly goes now, must meet it to a millimetre again."""
+    """Its rays to the vehicle miss it by less than a third of what they did, and by no more than refine owns up to."""
     assert bump.knock is not None
     log, rig, index = log_of(flown(bump), bump.rig(), tmp_path / "a.mcap"), bump.rig(), bump.knock.camera
     out = tmp_path / "room.toml"
@@ -103,7 +103,9 @@ def test_the_log_mends_the_camera(bump: Bump, tmp_path: Path, capsys: pytest.Cap
     assert figures["moves"][0]["name"] == f"cam{index}"
     assert figures["after"]["reprojection_px"] <= figures["before"]["reprojection_px"]
     truth, mended = knocked(rig.cameras[index], bump.knock), read_own(out)[index]
-    assert mean_miss_mm(bump, truth, mended) < 1.0 < mean_miss_mm(bump, truth, rig.cameras[index])
+    left_mm, before_mm = (mean_miss_mm(bump, truth, camera) for camera in (mended, rig.cameras[index]))
+    assert left_mm < 0.3 * before_mm
+    assert left_mm < 3.0 * figures["sigma_mm"]
 
 
 def test_a_log_in_which_nothing_moved_says_so(tmp_path: Path) -> None:
