@@ -68,6 +68,7 @@ class Outlet:
         self._packer = packer
         self._received: deque[tuple[str, Received]] = deque(maxlen=_KEPT_MESSAGES)
         self._now_ns = 0
+        self._calibration = ""
 
     def listen(self, now: Nanoseconds) -> None:
         """Hear from now on what comes in. now: reads stream time [ns], from any thread."""
@@ -87,9 +88,11 @@ class Outlet:
             Records in the order of the links; links with a thread report a message in a later call.
         """
         self._now_ns = now_ns
+        self._calibration = self._calibration if step.health is None else step.health.brief
         for spout in self._spouts:
             self._received.extend((spout.link.name, message) for message in spout.hear())
-            for message in spout.dialogue.due(step.state, now_ns, spout.link.state().superseded):
+            superseded = spout.link.state().superseded
+            for message in spout.dialogue.due(step.state, now_ns, superseded, self._calibration):
                 spout.link.send(message)
         for estimate in step.estimates:
             going = [spout for spout in self._spouts if spout.dialogue.admits(estimate, now_ns)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from tracker.health.values import Health
 from tracker.types import BallSighting, Estimate, Rejected
 
 
@@ -11,12 +12,15 @@ from tracker.types import BallSighting, Estimate, Rejected
 class Harvest:
     """What the rounds of one step gave so far.
 
+    refused: sightings that did not fit.  health: of the calibration, where there is news of it.
     find_ns, filter_ns: time that looking for balls and updating by them took, since the last estimate [ns].
     """
 
     sightings: list[BallSighting] = field(default_factory=list)
     rejections: list[Rejected] = field(default_factory=list)
     estimates: list[Estimate] = field(default_factory=list)
+    refused: list[BallSighting] = field(default_factory=list)
+    health: Health | None = None
     find_ns: int = 0
     filter_ns: int = 0
 

@@ -13,6 +13,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
+import numpy as np
+
 from tracker.cadence import Cadence
 from tracker.filter.bias import shared_covariance
 from tracker.filter.continuity import Continuity
@@ -21,6 +23,10 @@ from tracker.filter.history import History
 from tracker.filter.predict import Prediction, first_guess, predict
 from tracker.filter.sag import sag_covariance
 from tracker.harvest import Harvest
+from tracker.health.background import LIMIT_PX
+from tracker.health.mend import SHARE
+from tracker.health.values import Health
+from tracker.health.watch import CalibrationWatch
 from tracker.image.detect import Blob
 from tracker.image.eyes import Eyes
 from tracker.image.look import look_everywhere
@@ -33,6 +39,7 @@ from tracker.state import OFFSETS, REPORTED, State
 from tracker.study import Round, Study
 from tracker.tuning import Tuning
 from tracker.types import (
+    Array,
     Estimate,
     Event,
     Frame,
@@ -68,6 +75,9 @@ class Tracker:
         self._lights_tried = 0
         self._continuity = Continuity(tuning)
         self._cadence = Cadence(len(rig.cameras))
+        self._watch = CalibrationWatch(rig, tuning.process.pixel_noise_px)
+        self._moved_px = np.zeros(len(rig.cameras))
+        self._anew = False
         self._seen_ns = [-(2**63)] * len(rig.marker)
         self._sent_ns = -(2**63)
 
@@ -99,9 +109,40 @@ class Tracker:
         return self._step(harvest)
 
     def _step(self, harvest: Harvest) -> Step:
-        return Step(self._track, tuple(harvest.sightings), tuple(harvest.rejections), tuple(harvest.estimates))
+        return Step(
+            self._track,
+            tuple(harvest.sightings),
+            tuple(harvest.rejections),
+            tuple(harvest.estimates),
+            tuple(harvest.refused),
+            harvest.health,
+        )
 
     def _take_round(self, frames: Round, harvest: Harvest) -> None:
+        """Find the vehicle in a round, and see whether the cameras still stand where they did."""
+        first = len(harvest.sightings), len(harvest.refused)
+        self._locate(frames, harvest)
+        state = self._history.newest if self._track is TrackState.TRACKING else None
+        used, refused = harvest.sightings[first[0] :], harvest.refused[first[1] :]
+        health = self._watch.take(frames, used, refused, state, max(frame.t_ns for frame in frames))
+        if health is not None:
+            harvest.health = health
+            self._stand_by(health)
+
+    def _stand_by(self, health: Health) -> None:
+        """Turn each camera that has moved, or moved on, to where the room shows that it looks, and trust it less."""
+        for index, camera in enumerate(health.cameras):
+            news_px = abs(SHARE * camera.shift_px - float(self._moved_px[index]))
+            mended = self._watch.mended(index) if news_px > SHARE * LIMIT_PX else None
+            if mended is not None:
+                self._moved_px[index] = SHARE * camera.shift_px
+                cameras = (*self._rig.cameras[:index], mended, *self._rig.cameras[index + 1 :])
+                self._rig = replace(self._rig, cameras=cameras)
+                self._study.stand(self._rig)
+                self._history.doubt(index, SHARE * camera.shift_px)
+                self._anew = True
+
+    def _locate(self, frames: Round, harvest: Harvest) -> None:
         """Follow the track through a round, or look for the marker in it, and say where it is."""
         started_ns = self._stopwatch()
         harvest.find_ns = harvest.filter_ns = 0
@@ -110,7 +151,8 @@ class Tracker:
             harvest.rejections += [_late(frame) for frame in frames]
             return
         before = self._history.newest
-        found = self._follow(frames, t_ns, harvest) if self._track is TrackState.TRACKING else None
+        known, self._anew = self._track is TrackState.TRACKING and not self._anew, False
+        found = self._follow(frames, t_ns, harvest) if known else None
         if found is not None and self._carried_by_one(found):
             found, self._track = None, TrackState.LOST
         if before is None or t_ns >= before.t_ns:
@@ -217,7 +259,7 @@ class Tracker:
     def _estimate(self, found: Update, available_ns: int, stages: dict[str, int]) -> Estimate:
         state = found.state
         covariance = state.P[:REPORTED, :REPORTED].copy()
-        covariance[:3, :3] += shared_covariance(state, self._rig, self._eyes.exposure_s) + sag_covariance(state)
+        covariance[:3, :3] += self._shared(state) + sag_covariance(state)
         return Estimate(
             t_ns=state.t_ns,
             p_BinW=frozen_array(state.p_BinW),
@@ -234,6 +276,9 @@ class Tracker:
             available_ns=available_ns,
             stages_ns=MappingProxyType(stages),
         )
+
+    def _shared(self, state: State) -> Array:
+        return shared_covariance(state, self._rig, self._eyes.exposure_s, self._moved_px)
 
 
 def _late(frame: Frame) -> Rejected:

@@ -31,6 +31,11 @@ class Study:
         self._eyes = eyes
         self._stopwatch = stopwatch
 
+    def stand(self, rig: Rig) -> None:
+        """Take the cameras to stand elsewhere."""
+        self._rig = rig
+        self._eyes.stand(rig)
+
     def __call__(self, frames: Round, ahead: Prediction, harvest: Harvest, last: State | None) -> Update | None:
         """Look, update and learn, and go over the same images again as long as it is hardly known how balls look.
 
@@ -62,8 +67,10 @@ class Study:
             again, sharper = self._glance(frames, ahead, found.state, harvest, last)
             found, look = (again, sharper) if isinstance(again, Update) else (found, look)
         harvest.rejections += look.rejections
+        seen = [one.sighting for one in look.fitted]
         if isinstance(found, Rejected):
             harvest.rejections.append(found)
+            harvest.refused += seen
             return None
         harvest.sightings += found.used
         harvest.rejections += found.rejected
@@ -72,6 +79,7 @@ class Study:
         if len(found.used) < len(fitted):
             used = {(sighting.camera, sighting.ball) for sighting in found.used}
             fitted = [one for one in fitted if (one.sighting.camera, one.sighting.ball) in used]
+            harvest.refused += [one for one in seen if (one.camera, one.ball) not in used]
         self._eyes.learn(fitted, blindly=blindly)
         return found
 

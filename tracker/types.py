@@ -15,6 +15,8 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from tracker.health.values import Health
+
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 
@@ -157,9 +159,12 @@ class Step:
     """What one event did to the tracker.
 
     estimates are in order of time, each newer than any given before; usually none or one.
+    refused: sightings that did not fit.  health: of the calibration, where the event told something new of it.
     """
 
     state: TrackState
     sightings: tuple[BallSighting, ...] = ()
     rejections: tuple[Rejected, ...] = ()
     estimates: tuple[Estimate, ...] = ()
+    refused: tuple[BallSighting, ...] = ()
+    health: Health | None = None

@@ -30,6 +30,8 @@ class CameraReading:
     clock_offset_ms, clock_sigma_ms: how much later than its stamps it was found to see, beyond what the config says,
         and one sigma of that [ms]; None while not estimated.
     configured_offset_ms: the config's clock_offset_ms.
+    moved: whether it no longer stands where it stood when the flight began.  shift_px, at_vehicle_mm: see
+        `tracker.health.values.CameraHealth`.
     """
 
     name: str
@@ -38,6 +40,9 @@ class CameraReading:
     clock_offset_ms: float | None = None
     clock_sigma_ms: float | None = None
     configured_offset_ms: float = 0.0
+    moved: bool = False
+    shift_px: float = 0.0
+    at_vehicle_mm: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +64,8 @@ class Readings:
     latency_p99_ms: of the newest datagrams [ms].  nis_ratio: mean NIS over its degrees of freedom, of the last ten
         seconds.  None for what is not known.
     last_rejection: what was left out last and why, "" for nothing.
+    at_odds: the rays to the balls say that a camera has moved, and nothing tells which.
+    epipolar_px: by how much those rays miss each other; None where not known [px].
     """
 
     t_ns: int
@@ -75,3 +82,5 @@ class Readings:
     around: Surroundings
     limits: Limits
     last_rejection: str = ""
+    at_odds: bool = False
+    epipolar_px: float | None = None

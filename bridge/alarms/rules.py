@@ -178,6 +178,28 @@ def _clock_offset(now: Readings) -> Iterator[Finding]:
             )
 
 
+def _camera_moved(now: Readings) -> Iterator[Finding]:
+    for camera in now.cameras:
+        if camera.moved:
+            seen = f": the room stands {camera.shift_px:.1f} px off in its picture" if camera.shift_px else ""
+            yield Finding(
+                camera.name,
+                Verdict.BAD,
+                f"{camera.name} was moved{seen}, {camera.at_vehicle_mm:.0f} mm at the vehicle",
+                "land, fix it; then `posebridge calibrate refine LOG`, or calibrate the room anew",
+            )
+
+
+def _cameras_at_odds(now: Readings) -> Iterator[Finding]:
+    if now.at_odds:
+        yield Finding(
+            "",
+            Verdict.BAD,
+            f"a camera was moved: rays to the balls miss by {now.epipolar_px or 0:.1f} px, and nothing tells whose",
+            "land, see which hangs loose; then calibrate the room anew; hang something with corners where they look",
+        )
+
+
 def _log_stopped(now: Readings) -> Iterator[Finding]:
     log = now.around.log
     if log is not None and log.error:
@@ -210,6 +232,8 @@ RULES = (
     Rule("camera_silent", Level.ALARM, 0.0, 1.0, _camera_silent),
     Rule("camera_blind", Level.WARNING, 0.0, 1.0, _camera_blind),
     Rule("ball_unseen", Level.WARNING, 0.0, 1.0, _ball_unseen),
+    Rule("camera_moved", Level.ALARM, 0.0, 5.0, _camera_moved),
+    Rule("cameras_at_odds", Level.ALARM, 0.0, 5.0, _cameras_at_odds),
     Rule("clock_offset", Level.WARNING, 2.0, 2.0, _clock_offset),
     *LINK_RULES,
     Rule("log_stopped", Level.WARNING, 0.0, 0.0, _log_stopped),

@@ -158,10 +158,11 @@ class Dialogue:
             if message.message == TIMESYNC:
                 self._take_time(message)
 
-    def due(self, track: TrackState, now_ns: int, superseded: int = 0) -> list[Message]:
+    def due(self, track: TrackState, now_ns: int, superseded: int = 0, calibration: str = "") -> list[Message]:
         """Return the messages besides poses that are due at stream time now_ns [ns].
 
         superseded: how many messages of this link a newer one has replaced so far.
+        calibration: what is wrong with the cameras' stand in a few words, "" for nothing.
         """
         messages = []
         self._saturation.take(superseded, now_ns)
@@ -180,7 +181,7 @@ class Dialogue:
             asked = self._heading.due(self.peer, now_ns, self._streams.rate_hz(ATTITUDE))
         if asked is not None:
             messages.append(asked)
-        return messages + self._news.due(self._facts(track, now_ns), now_ns)
+        return messages + self._news.due(self._facts(track, now_ns, calibration), now_ns)
 
     def admits(self, estimate: Estimate, now_ns: int) -> bool:
         """Say whether an estimate may go out now, and count it if not."""
@@ -225,13 +226,13 @@ class Dialogue:
         waits = self.profile.needs_origin and self._terms.origin is not None and not self._origin.settled
         return f"origin: {self._origin.state}" if waits else ""
 
-    def _facts(self, track: TrackState, now_ns: int) -> Facts:
+    def _facts(self, track: TrackState, now_ns: int, calibration: str) -> Facts:
         """Return what the pilot may have to hear of."""
         sync = self._sync.state()
         restarts = 0 if sync is None else sync.restarts
         return Facts(
             track, self._late, self._is_away(now_ns), self._saturation.now, restarts, self._watch.other_autopilot,
-            self._origin.state, self._heading.reading.brief,
+            self._origin.state, self._heading.reading.brief, calibration,
         )  # fmt: skip
 
     def _by_arrival(self) -> bool:

@@ -22,7 +22,7 @@ class Facts:
     late: the newest estimate was too old to send.  away: the autopilot has fallen silent.
     saturated: the link does not take all that it is given.  restarts: how often the autopilot's clock has jumped.
     stranger: system id of a second autopilot, None for none.
-    yaw: what the yaw watch has to say in a few words, "" for nothing.
+    yaw, calibration: what the watches over them have to say in a few words, "" for nothing.
     """
 
     track: TrackState
@@ -33,6 +33,7 @@ class Facts:
     stranger: int | None
     origin: OriginState
     yaw: str = ""
+    calibration: str = ""
 
 
 class Saturation:
@@ -77,6 +78,7 @@ class News:
         jumped = f"autopilot clock stepped ({facts.restarts})" if facts.restarts else ""
         yield "clock", jumped, Severity.WARNING
         yield "yaw", facts.yaw, Severity.CRITICAL
+        yield "calibration", facts.calibration, Severity.CRITICAL
         stranger = "" if facts.stranger is None else f"autopilot {facts.stranger} ignored"
         yield "stranger", stranger, Severity.WARNING
         origin = f"origin {facts.origin.name.lower()}" if facts.origin in ORIGIN_TROUBLE else ""

@@ -12,6 +12,7 @@ from bridge.heard import NOTHING, Heard
 from bridge.log import triangle
 from bridge.log.film import Mark
 from bridge.wire import Sent
+from tracker.health.values import Health
 from tracker.maths import so3
 from tracker.types import BallSighting, Estimate, Event, Frame, Rejected, Step
 
@@ -104,26 +105,52 @@ def latency_value(estimate: Estimate, sent: tuple[Sent, ...]) -> Value:
     }
 
 
-def sightings_value(frame: FrameTime, sightings: tuple[BallSighting, ...]) -> Value:
+def sightings_value(
+    frame: FrameTime, sightings: tuple[BallSighting, ...], refused: tuple[BallSighting, ...] = ()
+) -> Value:
     """Return the `/sightings` message of one frame."""
     return {
         "camera": frame.camera,
         "t_ns": frame.t_ns,
         "available_ns": frame.available_ns,
-        "sightings": [_sighting_value(sighting) for sighting in sightings],
+        "sightings": [
+            *(_sighting_value(sighting, used=True) for sighting in sightings),
+            *(_sighting_value(sighting, used=False) for sighting in refused),
+        ],
     }
 
 
-def _sighting_value(sighting: BallSighting) -> Value:
+def _sighting_value(sighting: BallSighting, *, used: bool) -> Value:
     u, v = sighting.uv_px.tolist()
     uu, uv, _, vv = sighting.cov_px.ravel().tolist()
     return {
+        "used": used,
         "camera": sighting.camera,
         "ball": sighting.ball,
         "t_ns": sighting.t_ns,
         "u_px": u,
         "v_px": v,
         "cov_px2": [uu, uv, vv],
+    }
+
+
+def health_value(health: Health) -> Value:
+    """Return the `/health` message of what was said of the calibration."""
+    return {
+        "t_ns": health.t_ns,
+        "at_odds": health.at_odds,
+        "epipolar_px": health.epipolar_px,
+        "spacing_mm": health.spacing_mm,
+        "cameras": [
+            {
+                "name": camera.name,
+                "moved": camera.moved,
+                "witness": camera.witness.value,
+                "shift_px": camera.shift_px,
+                "at_vehicle_mm": camera.at_vehicle_mm,
+            }
+            for camera in health.cameras
+        ],
     }
 
 

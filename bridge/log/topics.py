@@ -162,7 +162,8 @@ SIGHTINGS = json_topic(
     t_ns=integer("mid-exposure of the frame, stream time [ns]"),
     available_ns=integer("stopwatch reading when the image stood in memory [ns]"),
     sightings=each(
-        "balls seen",
+        "balls seen, and whether the estimate went by them",
+        used={"type": "boolean", "description": "false: it did not fit"},
         camera=integer("index of the camera"),
         ball=integer("index of the marker's ball"),
         t_ns=integer("mid-exposure, stream time [ns]"),
@@ -182,6 +183,22 @@ REJECTIONS = json_topic(
         camera=integer("index of the camera, -1 for none"),
     ),
 )
+HEALTH = json_topic(
+    "/health",
+    "posebridge.Health",
+    t_ns=integer("when it was judged, stream time [ns]"),
+    at_odds={"type": "boolean", "description": "some camera has moved, and nothing tells which"},
+    epipolar_px=number("by how much rays to the balls miss each other, rms [px]"),
+    spacing_mm=number("how far the balls stand from their distances on the marker, rms [mm]"),
+    cameras=each(
+        "in their order",
+        name=text("the camera's"),
+        moved={"type": "boolean", "description": "it no longer stands where it stood when the flight began"},
+        witness=text("what the room tells of it: learning, still, moved or blind"),
+        shift_px=number("how far the room has moved in its picture, at the corner where that is most [px]"),
+        at_vehicle_mm=number("what that shift is at the vehicle's distance [mm]"),
+    ),
+)
 CLOCK = json_topic(
     "/clock",
     "posebridge.Clock",
@@ -198,4 +215,4 @@ EVENTS = json_topic(
     detail=text("in words"),
 )
 
-FIXED = (POSE, VEHICLE_TF, CAMERA_TF, MARKER, LOG, ESTIMATE, LATENCY, SIGHTINGS, REJECTIONS, CLOCK)
+FIXED = (POSE, VEHICLE_TF, CAMERA_TF, MARKER, LOG, ESTIMATE, LATENCY, SIGHTINGS, REJECTIONS, HEALTH, CLOCK)

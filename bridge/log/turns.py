@@ -14,12 +14,13 @@ from bridge.heard import NOTHING, Heard
 from bridge.log import received, topics, triangle
 from bridge.log.reader import LogReader, Record
 from bridge.wire import Sent
+from tracker.health.values import CameraHealth, Health, Witness
 from tracker.types import Array, BallSighting, Estimate, Event, Frame, Reason, Rejected, Step, TrackState, frozen_array
 
 _NO_IMAGE = np.zeros((0, 0, 3), np.uint8)
 _FAR_TOPICS = frozenset({t.name for t in (received.TIMESYNC, received.AUTOPILOT, received.LINK)})
 _TOPICS = _FAR_TOPICS | {
-    t.name for t in (topics.SIGHTINGS, topics.REJECTIONS, topics.ESTIMATE, topics.LATENCY, topics.LOG)
+    t.name for t in (topics.SIGHTINGS, topics.REJECTIONS, topics.HEALTH, topics.ESTIMATE, topics.LATENCY, topics.LOG)
 }
 _STATES = {state.value: state for state in TrackState}
 _REASONS = {reason.value: reason for reason in Reason}
@@ -45,9 +46,12 @@ def turns(reader: LogReader) -> Iterator[LoggedTurn]:
             state = _new_state(record, state)
             yield LoggedTurn(None, Step(state), (), now_ns)
         elif record.topic == topics.SIGHTINGS.name:
-            yield LoggedTurn(_frame(value), Step(state, sightings=_sightings(value)), (), now_ns)
+            step = Step(state, sightings=_sightings(value, used=True), refused=_sightings(value, used=False))
+            yield LoggedTurn(_frame(value), step, (), now_ns)
         elif record.topic == topics.REJECTIONS.name:
             yield LoggedTurn(None, Step(state, rejections=_rejections(value)), (), now_ns)
+        elif record.topic == topics.HEALTH.name:
+            yield LoggedTurn(None, Step(state, health=_health(value)), (), now_ns)
         elif record.topic == topics.ESTIMATE.name:
             waiting = value
         elif record.topic == topics.LATENCY.name:
@@ -87,7 +91,16 @@ def _frame(value: dict[str, Any]) -> Frame:
     return Frame(value["camera"], value["t_ns"], _NO_IMAGE, value["available_ns"])
 
 
-def _sightings(value: dict[str, Any]) -> tuple[BallSighting, ...]:
+def _health(value: dict[str, Any]) -> Health:
+    cameras = tuple(
+        CameraHealth(one["name"], one["moved"], Witness(one["witness"]), one["shift_px"], one["at_vehicle_mm"])
+        for one in value["cameras"]
+    )
+    return Health(value["t_ns"], cameras, value["at_odds"], value["epipolar_px"], value["spacing_mm"])
+
+
+def _sightings(value: dict[str, Any], *, used: bool) -> tuple[BallSighting, ...]:
+    """Return those that the estimate went by, or the others; in a log of before both were kept all were used."""
     return tuple(
         BallSighting(
             one["camera"],
@@ -97,6 +110,7 @@ def _sightings(value: dict[str, Any]) -> tuple[BallSighting, ...]:
             frozen_array([one["cov_px2"][:2], one["cov_px2"][1:]]),
         )
         for one in value["sightings"]
+        if one.get("used", True) is used
     )
 
 

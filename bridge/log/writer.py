@@ -94,10 +94,12 @@ class LogWriter:
         if entry.film is not None and self._film is not None:
             self._write_film(entry.film, self._film, now_ns)
         if entry.frame is not None:
-            value = values.sightings_value(entry.frame, entry.step.sightings)
+            value = values.sightings_value(entry.frame, entry.step.sightings, entry.step.refused)
             self._json(topics.SIGHTINGS, value, now_ns, entry.frame.t_ns)
         if entry.rejections:
             self._json(topics.REJECTIONS, values.rejections_value(entry.rejections), now_ns, now_ns)
+        if entry.step.health is not None:
+            self._json(topics.HEALTH, values.health_value(entry.step.health), now_ns, entry.step.health.t_ns)
         for estimate in entry.step.estimates:
             self._write_estimate(estimate, entry.sent, now_ns)
         for sent in entry.sent:

@@ -16,6 +16,7 @@ from bridge.telemetry import snapshot as page
 from bridge.telemetry.bins import KEPT, Bin
 from bridge.telemetry.gauges import WINDOW, Gauges
 from bridge.telemetry.states import Surroundings
+from tracker.health.values import CameraHealth
 from tracker.maths import so3
 from tracker.types import Array
 
@@ -46,6 +47,8 @@ def readings_of(gauges: Gauges, around: Surroundings, limits: Limits) -> Reading
         around=around,
         limits=limits,
         last_rejection=gauges.last_rejection,
+        at_odds=gauges.health is not None and gauges.health.at_odds,
+        epipolar_px=None if gauges.health is None else gauges.health.epipolar_px,
     )
 
 
@@ -91,6 +94,7 @@ def snapshot_of(
             tuple(stage for stage in stages if stage.name != TOTAL)[:MANY],
         ),
         nis=_nis(gauges),
+        calibration=_calibration(gauges),
         balls=tuple(_short(name) for name in gauges.names.balls[:MANY]),
         cameras=tuple(
             _camera(gauges, window, index, tally.frames.get(name, 0))
@@ -119,7 +123,7 @@ def nis_band(dof: int) -> tuple[float, float]:
 
 def _camera_reading(gauges: Gauges, index: int) -> CameraReading:
     offset_ms, sigma_ms = _offset(gauges, index)
-    names = gauges.names
+    names, health = gauges.names, _health(gauges, index)
     return CameraReading(
         name=names.cameras[index],
         silent_ms=gauges.silent_ms(index),
@@ -127,7 +131,21 @@ def _camera_reading(gauges: Gauges, index: int) -> CameraReading:
         clock_offset_ms=offset_ms,
         clock_sigma_ms=sigma_ms,
         configured_offset_ms=names.configured_offsets_ms[index],
+        moved=health is not None and health.moved,
+        shift_px=0.0 if health is None else health.shift_px,
+        at_vehicle_mm=0.0 if health is None else health.at_vehicle_mm,
     )
+
+
+def _health(gauges: Gauges, camera: int) -> CameraHealth | None:
+    return None if gauges.health is None else gauges.health.cameras[camera]
+
+
+def _calibration(gauges: Gauges) -> page.Calibration:
+    health = gauges.health
+    if health is None:
+        return page.Calibration()
+    return page.Calibration(health.brief, health.epipolar_px, health.spacing_mm)
 
 
 def _offset(gauges: Gauges, camera: int) -> tuple[float | None, float | None]:
@@ -175,6 +193,7 @@ def _nis(gauges: Gauges) -> page.Nis:
 def _camera(gauges: Gauges, window: Sequence[Bin], index: int, frames: int) -> page.CameraView:
     recent = sum(each.frames[index] for each in window)
     offset_ms, sigma_ms = _offset(gauges, index)
+    health = _health(gauges, index)
     return page.CameraView(
         name=_short(gauges.names.cameras[index]),
         frames=frames,
@@ -186,6 +205,8 @@ def _camera(gauges: Gauges, window: Sequence[Bin], index: int, frames: int) -> p
         ),
         clock_offset_ms=offset_ms,
         clock_sigma_ms=sigma_ms,
+        room="" if health is None else health.witness.value,
+        room_shift_px=0.0 if health is None else health.shift_px,
     )
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from bridge.telemetry.bins import Bins
 from bridge.wire import Sent
+from tracker.health.values import Health
 from tracker.rig import Rig
 from tracker.types import Estimate, Event, Frame, Rejected, Step, TrackState
 
@@ -40,6 +41,7 @@ class Gauges:
     Rates and gaps are counted by when poses leave, as the autopilot sees them, not by when their frames were taken.
 
     now_ns: stream time of the newest turn [ns].  newest: the last estimate.  state: the track's.
+    health: what was last said of the calibration.
     gap_ever_ns: longest between two poses, None with fewer [ns].
     """
 
@@ -47,6 +49,7 @@ class Gauges:
         self.names = names
         self.now_ns = 0
         self.newest: Estimate | None = None
+        self.health: Health | None = None
         self.state = TrackState.SEARCHING
         self.last_rejection = ""
         self.bins = Bins(len(names.cameras), len(names.balls))
@@ -74,6 +77,7 @@ class Gauges:
         for sighting in step.sightings:
             here.seen[sighting.camera][sighting.ball] += 1
             self._used_ns[sighting.camera][sighting.ball] = self.now_ns
+        self.health = step.health or self.health
         if step.rejections:
             last = step.rejections[-1]
             self.last_rejection = f"{last.reason.value}, {last.detail}"

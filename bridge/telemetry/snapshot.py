@@ -112,6 +112,8 @@ class CameraView:
     """One camera. rate_hz, seen: of the last ten seconds; seen: share of its frames each ball was used from, by ball.
 
     clock_offset_ms, clock_sigma_ms: see `bridge.alarms.CameraReading`.
+    room: what the room behind the vehicle tells of it, see `tracker.health.values.Witness`; "" for nothing yet.
+    room_shift_px: how far the room has moved in its picture since the flight began.
     """
 
     name: str
@@ -121,6 +123,20 @@ class CameraView:
     seen: tuple[float, ...]
     clock_offset_ms: float | None = None
     clock_sigma_ms: float | None = None
+    room: str = ""
+    room_shift_px: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """Whether the cameras still stand where they did: what is wrong in a few words, "" for nothing.
+
+    epipolar_px, spacing_mm: see `tracker.health.values.Health`.
+    """
+
+    wrong: str = ""
+    epipolar_px: float | None = None
+    spacing_mm: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,6 +168,7 @@ class Snapshot:
     rate: Rate
     latency: Latency
     nis: Nis
+    calibration: Calibration
     balls: tuple[str, ...]
     cameras: tuple[CameraView, ...]
     rejected: dict[str, int]

@@ -127,10 +127,10 @@ def test_json_schemas_stay_within_what_foxglove_reads(plain: McapReader) -> None
     summary = plain.get_summary()
     assert summary is not None
     schemas = [json.loads(one.data) for one in summary.schemas.values() if one.encoding == "jsonschema"]
-    assert len(schemas) == 6
+    assert len(schemas) == 7
     nodes = list(schemas)
     for node in nodes:
-        assert node["type"] in {"object", "array", "string", "number", "integer"}
+        assert node["type"] in {"object", "array", "string", "number", "integer", "boolean"}
         nodes += node["properties"].values() if node["type"] == "object" else []
         nodes += [node["items"]] if node["type"] == "array" else []
 

@@ -148,3 +148,29 @@ def room(
     tell_of_compiling()
     if run_room(request, clocks_of(context)).grade is Grade.NOT_GOOD:
         raise typer.Exit(EXIT_CALIBRATION_NOT_GOOD)
+
+
+@calibrate.command()
+def refine(
+    log: Annotated[Path, typer.Argument(help="The log of a flight in which a camera was bumped.")],
+    moved: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="The camera that moved; else those that the flight named. May be given again.", metavar="CAM"
+        ),
+    ] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Write the cameras here, as [[rig.cameras]].", metavar="ROOM.toml")
+    ] = None,
+    overwrite: OverwriteOption = False,
+    json: JsonOption = False,
+) -> None:
+    """Mend bumped cameras from a flight's log; those that did not move hold the room (docs/health.md).
+
+    Exit code 0: good or usable. 1: not good. 2: no camera moved, all did, or too little was seen since.
+    """
+    from tools.calibrate.refine.judge import Grade
+    from tools.calibrate.refine.session import RefineRequest, run_refine
+
+    if run_refine(RefineRequest(log, tuple(moved or ()), out, overwrite, json)).grade is Grade.NOT_GOOD:
+        raise typer.Exit(EXIT_CALIBRATION_NOT_GOOD)

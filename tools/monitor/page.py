@@ -10,7 +10,7 @@ from rich.text import Text
 
 from bridge.alarms import Alarm, Level
 from bridge.telemetry.compose import EDGES_MS
-from bridge.telemetry.snapshot import CameraView, Nis, Pose, Snapshot, Stage
+from bridge.telemetry.snapshot import Calibration, CameraView, Nis, Pose, Snapshot, Stage
 from bridge.wire import LinkState
 from tools.monitor.bars import BLOCKS, bars
 
@@ -36,6 +36,7 @@ def page(snapshot: Snapshot, where: str, note: str = "", glyphs: str = BLOCKS) -
         *_pose(snapshot.pose),
         _rate(snapshot, glyphs),
         _nis(snapshot.nis),
+        _calibration(snapshot.calibration),
         _latency(snapshot, glyphs),
         *(_camera(camera, snapshot.balls) for camera in snapshot.cameras),
         *_links(snapshot),
@@ -115,6 +116,15 @@ def _nis(nis: Nis) -> Text:
     return _row("NIS", f"{nis.mean_ratio:.2f}, 95 % of true filters {nis.low:.2f} to {nis.high:.2f}: {verdict}")
 
 
+def _calibration(held: Calibration) -> Text:
+    if held.epipolar_px is None or held.spacing_mm is None:
+        return _row("cameras", (held.wrong or "-", BAD if held.wrong else ""))
+    verdict = (held.wrong, BAD) if held.wrong else ("stand as they did", GOOD)
+    return _row(
+        "cameras", verdict, f", rays miss by {held.epipolar_px:.2f} px, balls apart within {held.spacing_mm:.2f} mm"
+    )
+
+
 def _latency(snapshot: Snapshot, glyphs: str) -> Table:
     table = Table(box=None, pad_edge=False, padding=(0, 1, 0, 0), header_style=QUIET)
     table.add_column("latency, ms", no_wrap=True)
@@ -139,7 +149,8 @@ def _camera(camera: CameraView, balls: Sequence[str]) -> Text:
     clock = ""
     if camera.clock_offset_ms is not None and camera.clock_sigma_ms:
         clock = f", clock {camera.clock_offset_ms:+.2f} +- {camera.clock_sigma_ms:.2f} ms"
-    return _row(camera.name, f"{camera.rate_hz:.1f} Hz, saw {seen}{clock}")
+    room = f", room {camera.room} {camera.room_shift_px:.2f} px" if camera.room else ""
+    return _row(camera.name, f"{camera.rate_hz:.1f} Hz, saw {seen}{clock}{room}")
 
 
 def _links(snapshot: Snapshot) -> Iterator[Text]:

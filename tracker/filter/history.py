@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from tracker.filter.ekf import Update
+from tracker.filter.noise import doubted
 from tracker.state import State
 from tracker.types import BallSighting
 
@@ -43,6 +44,13 @@ class History:
         """Forget all and begin with an update."""
         self._updates.clear()
         self._updates.append(update)
+
+    def doubt(self, camera: int, sigma_px: float) -> None:
+        """Begin anew with the newest update, one camera's noise unknown but for a sigma [px]."""
+        if self._updates:
+            newest = self._updates[-1]
+            noise = doubted(newest.state.noise, camera, sigma_px)
+            self.restart(replace(newest, state=replace(newest.state, noise=noise)))
 
     def back_to(self, t_ns: int) -> list[Later]:
         """Take back the updates after an instant that is not forgotten; return them in order of time."""

@@ -29,6 +29,13 @@ def start_noise(cameras: int, sigma_px: float) -> Array:
     return np.tile([variance, PRIOR_PIXELS / (2.0 * variance**2)], (cameras, 1))
 
 
+def doubted(noise: Array, camera: int, sigma_px: float) -> Array:
+    """Return the noise (cameras, 2) of a rig of which one camera has lost its trust."""
+    after = noise.copy()
+    after[camera] = start_noise(1, sigma_px)[0]
+    return after
+
+
 @compiled("f8[:, ::1](f8[:, ::1], i8[::1], f8[::1], f8[:, ::1])")
 def learned(noise: Array, cameras: Indices, u: Array, inverse: Array) -> Array:
     """Return the noise (cameras, 2) after one round.

@@ -44,6 +44,10 @@ class Eyes:
         enough = all(appearance.light.count >= LEARN_ALL for appearance in self._appearances)
         self._settled = self._gamma_known and enough  # how balls look is known, so that little is left to learn
 
+    def stand(self, rig: Rig) -> None:
+        """Take the cameras to stand elsewhere."""
+        self._rig = rig
+
     @property
     def lessons_due(self) -> int:
         """Return how often the first images should be gone over again, since nothing else is known yet."""

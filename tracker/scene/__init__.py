@@ -7,7 +7,7 @@ ray-traced, not drawn as a circle.
 from tracker.scene.look import Look
 from tracker.scene.render import SceneRenderer
 from tracker.scene.thing import Bar, Sphere, hand
-from tracker.scene.trouble import Occluder, Trouble
+from tracker.scene.trouble import Knock, Occluder, Trouble
 from tracker.scene.vehicle import Pose
 
-__all__ = ["Bar", "Look", "Occluder", "Pose", "SceneRenderer", "Sphere", "Trouble", "hand"]
+__all__ = ["Bar", "Knock", "Look", "Occluder", "Pose", "SceneRenderer", "Sphere", "Trouble", "hand"]

@@ -11,9 +11,10 @@ import numpy as np
 from tracker.camera import Camera
 from tracker.rig import Marker, Rig
 from tracker.scene.backdrop import backdrop, vignette
+from tracker.scene.knock import knocked, seen_from
 from tracker.scene.look import Look
 from tracker.scene.sensor import Plane, Sensor, to_light
-from tracker.scene.trouble import AS_LIT, NO_TROUBLE, Trouble
+from tracker.scene.trouble import AS_LIT, NO_TROUBLE, Knock, Trouble
 from tracker.scene.vehicle import Pose, VehiclePainter
 from tracker.types import Image
 
@@ -52,7 +53,8 @@ class SceneRenderer:
             trouble: what spoils the picture.
         """
         occluders = tuple(each for each in trouble.occluders if each.camera == camera)
-        return self._views[camera].render(poses, replace(trouble, occluders=occluders))
+        knocks = tuple(each for each in trouble.knocks if each.camera == camera)
+        return self._views[camera].render(poses, replace(trouble, occluders=occluders, knocks=knocks))
 
 
 class _View:
@@ -63,16 +65,20 @@ class _View:
         size = (camera.width_px, camera.height_px)
         room: Image | Plane = backdrop(*size, rng) if given is None else given
         self._camera = camera
+        self._marker = marker
         self._look = look
         self._vignette = np.ascontiguousarray(np.broadcast_to(vignette(*size), (size[1], size[0], 3)))
-        self._backdrop: Plane = _blurred(to_light(room, look.gamma), look.blur_px) * self._vignette
+        self._room: Plane = _blurred(to_light(room, look.gamma), look.blur_px)
+        self._backdrop: Plane = self._room * self._vignette
         self._sensor = Sensor(*size, look, rng)
         self._gain = AS_LIT
+        self._knocks: tuple[Knock, ...] = ()
         self._still = self._sensor.develop(self._backdrop)
         self._vehicle = VehiclePainter(camera, marker, look)
 
     def render(self, poses: Sequence[Pose], trouble: Trouble) -> Image:
         """Render one image."""
+        self._stand(trouble.knocks)
         gain = self._light(trouble.gain_bgr)
         display, sigma = self._still
         noise = self._sensor.next_noise()
@@ -89,6 +95,19 @@ class _View:
             corner = (each.u_px + each.width_px, each.v_px + each.height_px)
             cv2.rectangle(image, (each.u_px, each.v_px), corner, each.bgr, cv2.FILLED)
         return _broken(self._sensor.compress(image), trouble.broken_from)
+
+    def _stand(self, knocks: tuple[Knock, ...]) -> None:
+        """Stand where these knocks bring the camera, and see room and vehicle from there."""
+        if knocks == self._knocks:
+            return
+        self._knocks, camera, room = knocks, self._camera, self._room
+        for knock in knocks:
+            camera = knocked(camera, knock)
+        if knocks:
+            room = seen_from(room, self._camera, camera)
+        self._backdrop = room * self._vignette
+        self._vehicle = VehiclePainter(camera, self._marker, self._look)
+        self._still = self._sensor.develop(self._backdrop * np.array(self._gain, dtype=np.float32))
 
     def _light(self, gain_bgr: tuple[float, float, float]) -> Plane:
         """Light the backdrop anew if the light has changed; return the gain (3,)."""

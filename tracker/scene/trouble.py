@@ -21,12 +21,25 @@ class Occluder:
 
 
 @dataclass(frozen=True, slots=True)
+class Knock:
+    """A camera that was moved, by index.
+
+    turn_deg: about its own axes x (right), y (down) and z (ahead).  shift_mm: along them, as they were.
+    """
+
+    camera: int
+    turn_deg: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    shift_mm: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
 class Trouble:
     """What spoils a picture on purpose.
 
     light_gain: factor on all light; 0.2 is a blind drawn, 2 a lamp switched on, 0.5 an exposure halved.
     gains_bgr: factors on the light of each channel: lamps of another colour, or a white balance that drifts.
     occluders: things held before the cameras.
+    knocks: cameras that no longer stand where they did.
     things: what else stands or moves in the room, the same for all cameras.
     repainted: balls of the marker, by index, that show another colour.
     broken_from: share of the image's height from which on its rows are garbage, as a damaged JPEG gives; 1 for none.
@@ -35,6 +48,7 @@ class Trouble:
     light_gain: float = 1.0
     gains_bgr: tuple[float, float, float] = (1.0, 1.0, 1.0)
     occluders: tuple[Occluder, ...] = ()
+    knocks: tuple[Knock, ...] = ()
     things: tuple[Sphere | Bar, ...] = ()
     repainted: tuple[tuple[int, Bgr], ...] = ()
     broken_from: float = 1.0

@@ -57,6 +57,8 @@ FAULTS: dict[str, Readings] = {
     "nis_low": replace(WELL, nis_ratio=0.2),
     "camera_silent": replace(WELL, cameras=(CameraReading("left", 900.0),)),
     "camera_blind": replace(WELL, cameras=(CameraReading("left", 20.0, 8.0),)),
+    "camera_moved": replace(WELL, cameras=(CameraReading("left", 20.0, moved=True, shift_px=4.2, at_vehicle_mm=11.0),)),
+    "cameras_at_odds": replace(WELL, at_odds=True, epipolar_px=2.1),
     "ball_unseen": replace(WELL, balls=(BallReading("green", 5.0),)),
     "clock_offset": replace(WELL, cameras=(CameraReading("left", 20.0, 0.0, 8.0, 0.2, 5.0),)),
     "link_down": around(links=(replace(UP, up=False, reason="no such device"),)),

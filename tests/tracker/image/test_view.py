@@ -86,4 +86,4 @@ def test_what_all_balls_share_shrinks_with_the_information_of_all_cameras() -> N
         scale = camera.focal_px / float(np.linalg.norm(ray))
         streak_px = scale * float(np.linalg.norm(across @ now.v_BinW)) * exposure_s
         information += scale**2 / (LIGHT_PX**2 + (STREAK_SHARE * streak_px) ** 2) * across
-    assert np.allclose(shared_covariance(now, RIG, exposure_s) @ information, np.eye(3))
+    assert np.allclose(shared_covariance(now, RIG, exposure_s, np.zeros(2)) @ information, np.eye(3))

@@ -1,0 +1,1 @@
+"""Cameras that were bumped in flight, mended from the flight's log."""
