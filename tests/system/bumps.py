@@ -77,7 +77,7 @@ def flown(bump: Bump) -> Told:
     events, steps = [], []
     for event in footage(bump.trial(), bump.rig(), by_seconds(bump.trouble)):
         steps.append(tracker.step(event))
-        events.append(Frame(event.camera, event.t_ns, event.image[:0]) if isinstance(event, Frame) else event)
+        events.append(Frame(event.camera, event.t_ns, event.image[:0].copy()) if isinstance(event, Frame) else event)
     return Told(events, steps, compared(steps, bump.trial().vehicle()))
 
 

@@ -138,8 +138,8 @@ def room(
     Then the vehicle stands for 3 s on each of three level spots: the first is the origin, the second lies along x, the
     third aside (docs/room.md). Exit code 0: good or usable. 1: not good, with the reasons. 2: something to mend first.
     """
+    from tools.calibrate.grade import Grade
     from tools.calibrate.room.session import RoomRequest, run_room
-    from tools.calibrate.room.verdict import Grade
 
     request = RoomRequest(
         config, source, tuple(cameras or ()), frame, origin_mm, apart_mm, refine_intrinsics, by, seconds, out,
@@ -169,7 +169,7 @@ def refine(
 
     Exit code 0: good or usable. 1: not good. 2: no camera moved, all did, or too little was seen since.
     """
-    from tools.calibrate.refine.judge import Grade
+    from tools.calibrate.grade import Grade
     from tools.calibrate.refine.session import RefineRequest, run_refine
 
     if run_refine(RefineRequest(log, tuple(moved or ()), out, overwrite, json)).grade is Grade.NOT_GOOD:

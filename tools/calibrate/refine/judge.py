@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
+from tools.calibrate.grade import Grade
 from tools.calibrate.refine.evidence import Instant
 from tools.calibrate.refine.solve import SIGMA_PX, Refined
 from tracker.health.rays import residuals
@@ -18,14 +18,6 @@ from tracker.rig import Rig, make_rig
 
 GOOD_MM, USABLE_MM = 2.0, 5.0  # one sigma of the vehicle's place
 GOOD_PX, USABLE_PX = 0.5, 1.5  # held out
-
-
-class Grade(StrEnum):
-    """How good."""
-
-    GOOD = "good"
-    USABLE = "usable"
-    NOT_GOOD = "not good"
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,8 @@ from dataclasses import asdict
 
 import orjson
 
-from tools.calibrate.refine.judge import Grade, Judged
+from tools.calibrate.grade import Grade
+from tools.calibrate.refine.judge import Judged
 
 LAST = {
     Grade.GOOD: "Good: put these cameras into the config and fly.",

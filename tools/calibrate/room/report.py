@@ -7,9 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 import orjson
 
+from tools.calibrate.grade import Grade
 from tools.calibrate.room.held_out import HeldOut
 from tools.calibrate.room.room import Room
-from tools.calibrate.room.verdict import Grade, Verdict, scale_off_mm, scale_tolerance_mm
+from tools.calibrate.room.verdict import Verdict, scale_off_mm, scale_tolerance_mm
 from tools.calibrate.room.volume import CELLS
 
 LAST_LINES = {

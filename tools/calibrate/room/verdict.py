@@ -8,10 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from enum import StrEnum
 
 import numpy as np
 
+from tools.calibrate.grade import Grade
 from tools.calibrate.room.room import Room
 from tools.calibrate.room.sides import Side
 
@@ -26,14 +26,6 @@ SURE = 3.0  # sigmas from which a difference is no chance
 SIDE_MM = 0.5  # what a ruler errs by
 TAPE_MM = 2.0  # what a tape errs by, one sigma
 FAR_MM, FAR_DEG = 500.0, 20.0
-
-
-class Grade(StrEnum):
-    """How good."""
-
-    GOOD = "good"
-    USABLE = "usable"
-    NOT_GOOD = "not good"
 
 
 @dataclass(frozen=True, slots=True)

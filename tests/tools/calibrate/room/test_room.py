@@ -12,6 +12,7 @@ import pytest
 from bridge.settings import RigOrigin, load_settings, rig_of
 from tests.tools.calibrate.room.waved import watched
 from tests.tracker.paper_rig import paper_rig
+from tools.calibrate.grade import Grade
 from tools.calibrate.room.bundle import zoomed
 from tools.calibrate.room.file import Record, with_room
 from tools.calibrate.room.footage import Footage
@@ -20,7 +21,7 @@ from tools.calibrate.room.report import to_json, to_text
 from tools.calibrate.room.room import Room, Terms, calibrate_room
 from tools.calibrate.room.spots import Stand, floor_of
 from tools.calibrate.room.tracks import Track
-from tools.calibrate.room.verdict import Grade, judge
+from tools.calibrate.room.verdict import judge
 from tools.cli import run_command_line
 from tracker.errors import OperatorError
 from tracker.maths import so3
