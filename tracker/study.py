@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from tracker.filter.ekf import Update, update
 from tracker.filter.predict import Prediction
-from tracker.filter.witness import doubted_alone
+from tracker.filter.witness import doubted_alone, too_lonely
 from tracker.harvest import Harvest
 from tracker.image.eyes import Eyes
 from tracker.image.look import Look
@@ -93,6 +93,10 @@ class Study:
         found = self.update(ahead, doubted_alone([one.sighting for one in look.fitted], last))
         harvest.find_ns += looked_ns - started_ns
         harvest.filter_ns += self._stopwatch() - looked_ns
+        looking = [frame.camera for frame in frames]
+        if isinstance(found, Update) and too_lonely(found.used, looking, len(self._rig.marker)):
+            detail = f"camera {found.used[0].camera} shows {len(found.used)} of the balls, and no other one any"
+            found = Rejected(Reason.ALONE, detail, ahead.state.t_ns)
         if isinstance(found, Update) and last is None and not self._all_seen_twice(found):
             found = Rejected(Reason.GEOMETRY, "not every ball fits in two cameras", ahead.state.t_ns)
         return found, look

@@ -40,6 +40,7 @@ class Reason(StrEnum):
     AT_BORDER = "at_border"  # a ball cut by the image's border
     GATE = "gate"  # a sighting too far from the prediction
     FRAME_GATE = "frame_gate"  # a camera's sightings, taken together, too far from the prediction
+    ALONE = "alone"  # some of the balls in one camera, and none in another that looked as well
     PARALLAX = "parallax"  # rays too parallel to triangulate
     BEHIND = "behind"  # rays that meet behind a camera
     GEOMETRY = "geometry"  # triangulated balls that are not the marker

@@ -1,4 +1,4 @@
-"""A ball that comes back from hiding, and who bears it out.
+"""Who bears a sighting out: a ball that comes back from hiding, and a camera that sees what no other sees.
 
 While a ball is hidden the turn about the other two is open, and whatever has its colour near where it may be fits. What
 one camera sees there and another, which sees the other balls, does not, may be half a ball or two things in one: it is
@@ -18,6 +18,18 @@ from tracker.types import BallSighting, frozen_array
 OPEN_RAD = 0.005  # one sigma of attitude: well beyond what three balls leave
 WITNESSES = 2  # balls that a camera must see to bear witness against one more: what shows one may be lost itself
 DOUBT_PX = 1.5  # one sigma: half a ball's radius and more
+
+
+def too_lonely(used: Sequence[BallSighting], looking: Collection[int], balls: int) -> bool:
+    """Say whether an update rests on too little: some of the balls in one camera, where another looked and saw none.
+
+    One camera's two balls are four figures for six of a pose, and a thing of a ball's colour makes a pose of its own.
+
+    Args:
+        used: the sightings of one instant.  looking: the cameras that gave a frame of it.  balls: of the marker.
+    """
+    cameras = {sighting.camera for sighting in used}
+    return len(cameras) == 1 and len(set(looking)) > 1 and len(used) < balls
 
 
 def doubted_alone(sightings: Sequence[BallSighting], last: State | None) -> tuple[BallSighting, ...]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.tracker.rigs import TUNING
-from tracker.filter.witness import DOUBT_PX, OPEN_RAD, doubted_alone
+from tracker.filter.witness import DOUBT_PX, OPEN_RAD, doubted_alone, too_lonely
 from tracker.state import ATTITUDE, State, start_covariance
 from tracker.types import BallSighting, frozen_array
 
@@ -54,3 +54,20 @@ def test_one_open_axis_is_enough() -> None:
     P = known.P.copy()
     P[ATTITUDE.start + 2, ATTITUDE.start + 2] = (10.0 * OPEN_RAD) ** 2
     assert doubted_alone(WITH_ONE_ALONE, replace(known, P=P))[-1].cov_px[0, 0] > 1.0
+
+
+@pytest.mark.parametrize(
+    ("used", "looking", "lonely"),
+    [
+        (seen((1, 0), (1, 2)), (0, 1), True),
+        (seen((1, 0), (1, 1), (1, 2)), (0, 1), False),
+        (seen((1, 0), (1, 2)), (1,), False),
+        (seen((0, 1), (1, 0), (1, 2)), (0, 1), False),
+        (seen((2, 0)), (0, 1, 2), True),
+    ],
+    ids=["another saw none", "all balls", "no other looked", "another saw one", "one of three"],
+)
+def test_some_balls_in_one_camera_are_no_pose_while_another_sees_none(
+    used: list[BallSighting], looking: tuple[int, ...], lonely: bool
+) -> None:
+    assert too_lonely(used, looking, 3) is lonely
