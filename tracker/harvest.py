@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from tracker.health.values import Health
+from tracker.standing import Health
 from tracker.types import BallSighting, Estimate, Rejected
 
 

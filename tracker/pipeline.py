@@ -25,7 +25,6 @@ from tracker.filter.sag import sag_covariance
 from tracker.harvest import Harvest
 from tracker.health.background import LIMIT_PX
 from tracker.health.mend import SHARE
-from tracker.health.values import Health
 from tracker.health.watch import CalibrationWatch
 from tracker.image.detect import Blob
 from tracker.image.eyes import Eyes
@@ -34,6 +33,7 @@ from tracker.image.tint import Gains
 from tracker.intake import Intake
 from tracker.rig import Rig
 from tracker.rounds import Rounds
+from tracker.standing import Health
 from tracker.start.acquire import Seen, first_state
 from tracker.state import OFFSETS, REPORTED, State
 from tracker.study import Round, Study

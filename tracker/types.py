@@ -15,7 +15,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from tracker.health.values import Health
+from tracker.standing import Health
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]

@@ -31,7 +31,7 @@ class CameraReading:
         and one sigma of that [ms]; None while not estimated.
     configured_offset_ms: the config's clock_offset_ms.
     moved: whether it no longer stands where it stood when the flight began.  shift_px, at_vehicle_mm: see
-        `tracker.health.values.CameraHealth`.
+        `tracker.standing.CameraHealth`.
     """
 
     name: str

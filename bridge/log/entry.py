@@ -12,8 +12,8 @@ from bridge.heard import NOTHING, Heard
 from bridge.log import triangle
 from bridge.log.film import Mark
 from bridge.wire import Sent
-from tracker.health.values import Health
 from tracker.maths import so3
+from tracker.standing import Health
 from tracker.types import BallSighting, Estimate, Event, Frame, Rejected, Step
 
 Value = dict[str, Any]

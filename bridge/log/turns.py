@@ -14,7 +14,7 @@ from bridge.heard import NOTHING, Heard
 from bridge.log import received, topics, triangle
 from bridge.log.reader import LogReader, Record
 from bridge.wire import Sent
-from tracker.health.values import CameraHealth, Health, Witness
+from tracker.standing import CameraHealth, Health, Witness
 from tracker.types import Array, BallSighting, Estimate, Event, Frame, Reason, Rejected, Step, TrackState, frozen_array
 
 _NO_IMAGE = np.zeros((0, 0, 3), np.uint8)

@@ -16,8 +16,8 @@ from bridge.telemetry import snapshot as page
 from bridge.telemetry.bins import KEPT, Bin
 from bridge.telemetry.gauges import WINDOW, Gauges
 from bridge.telemetry.states import Surroundings
-from tracker.health.values import CameraHealth
 from tracker.maths import so3
+from tracker.standing import CameraHealth
 from tracker.types import Array
 
 EDGES_MS = tuple(10.0 ** (k / 5.0 - 2.0) for k in range(26))  # 0.01 ms to 1 s, five a decade

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 from bridge.telemetry.bins import Bins
 from bridge.wire import Sent
-from tracker.health.values import Health
 from tracker.rig import Rig
+from tracker.standing import Health
 from tracker.types import Estimate, Event, Frame, Rejected, Step, TrackState
 
 RECENT = 256  # datagrams that the recent latencies are of

@@ -112,7 +112,7 @@ class CameraView:
     """One camera. rate_hz, seen: of the last ten seconds; seen: share of its frames each ball was used from, by ball.
 
     clock_offset_ms, clock_sigma_ms: see `bridge.alarms.CameraReading`.
-    room: what the room behind the vehicle tells of it, see `tracker.health.values.Witness`; "" for nothing yet.
+    room: what the room behind the vehicle tells of it, see `tracker.standing.Witness`; "" for nothing yet.
     room_shift_px: how far the room has moved in its picture since the flight began.
     """
 
@@ -131,7 +131,7 @@ class CameraView:
 class Calibration:
     """Whether the cameras still stand where they did: what is wrong in a few words, "" for nothing.
 
-    epipolar_px, spacing_mm: see `tracker.health.values.Health`.
+    epipolar_px, spacing_mm: see `tracker.standing.Health`.
     """
 
     wrong: str = ""

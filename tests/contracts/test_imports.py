@@ -30,6 +30,7 @@ INNER_ROOMS = {
     "filter": {"maths", "filter"},
     "image": {"maths", "filter", "image"},
     "start": {"maths", "filter", "image", "start"},
+    "health": {"maths", "filter", "health"},
 }
 OUTSIDE_THE_CORE = {
     "pymavlink", "serial", "socket", "socketserver", "ssl", "asyncio", "selectors", "pydantic", "typer", "rich", "mcap",

@@ -14,10 +14,10 @@ from tools.bench.ring import ring_rig
 from tools.bench.trial import Flown, Trial, compared, footage
 from tools.request import Clocks
 from tools.session import recorder_of, tracker_of
-from tracker.health.values import Health
 from tracker.rig import Rig
 from tracker.scene import Knock, Look, Trouble
 from tracker.sources.sim import START_NS, SimTiming
+from tracker.standing import Health
 from tracker.types import Event, Frame, Step
 
 BUMP_S, DURATION_S, WITHIN_S = 7.0, 17.5, 10.0

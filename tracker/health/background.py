@@ -15,7 +15,7 @@ import numpy as np
 from tracker.camera import Camera
 from tracker.health.patch import Motion, Patch, choose_patches
 from tracker.health.shift import LEAST_PATCHES, Shift, find_shift
-from tracker.health.values import Witness
+from tracker.standing import Witness
 from tracker.types import Array, Image
 
 PASS_NS, HURRIED_NS = 4_000_000_000, 700_000_000  # in which each patch has its turn; the second on suspicion

@@ -20,8 +20,8 @@ from tracker.health.background import NEVER_NS, Background
 from tracker.health.mend import turned
 from tracker.health.rays import residuals
 from tracker.health.sample import take_sample
-from tracker.health.values import CameraHealth, Health, Witness
 from tracker.rig import Rig
+from tracker.standing import CameraHealth, Health, Witness
 from tracker.state import State
 from tracker.types import BallSighting, Frame
 

@@ -10,10 +10,10 @@ from tracker.health.background import PASS_NS, Background
 from tracker.health.mend import turned
 from tracker.health.patch import MOST, choose_patches
 from tracker.health.shift import find_shift
-from tracker.health.values import Witness
 from tracker.maths import so3
 from tracker.scene import Knock, SceneRenderer, Trouble
 from tracker.scene.knock import knocked
+from tracker.standing import Witness
 from tracker.types import Array, Image
 
 RIG = paper_rig()

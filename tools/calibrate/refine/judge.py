@@ -24,7 +24,7 @@ GOOD_PX, USABLE_PX = 0.5, 1.5  # held out
 class HeldOut:
     """What some cameras make of stretches held out, rms.
 
-    reprojection_px: of balls off their places, on an axis.  epipolar_px, spacing_mm: see `tracker.health.values`.
+    reprojection_px: of balls off their places, on an axis.  epipolar_px, spacing_mm: see `tracker.standing`.
     """
 
     reprojection_px: float
