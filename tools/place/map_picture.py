@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -123,9 +124,9 @@ def _limits(values: Array) -> tuple[float, float]:
     return low, max(high, 1.02 * low)
 
 
-def _box(axes: Axes, low: Array, high: Array, style: dict[str, object]) -> None:
+def _box(axes: Axes, low: Array, high: Array, style: dict[str, Any]) -> None:
     width, height = (high - low).tolist()
-    axes.add_patch(Rectangle((float(low[0]), float(low[1])), width, height, **style))  # type: ignore[arg-type]
+    axes.add_patch(Rectangle((float(low[0]), float(low[1])), width, height, **style))
 
 
 def _pair(point: Array) -> tuple[float, float]:

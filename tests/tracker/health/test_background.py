@@ -13,6 +13,7 @@ from tracker.health.shift import find_shift
 from tracker.maths import so3
 from tracker.scene import Knock, SceneRenderer, Trouble
 from tracker.scene.knock import knocked
+from tracker.scene.trouble import NO_TROUBLE
 from tracker.standing import Witness
 from tracker.types import Array, Image
 
@@ -31,7 +32,7 @@ class Room:
         self.background = Background(CAMERA)
         self._t_ns = 0
 
-    def seen(self, trouble: Trouble = Trouble(), frames: int = SETTLED) -> Background:  # noqa: B008
+    def seen(self, trouble: Trouble = NO_TROUBLE, frames: int = SETTLED) -> Background:
         """Watch for so many frames."""
         for _ in range(frames):
             self._t_ns += FRAME_NS
