@@ -45,7 +45,7 @@ class Verdict:
 
 
 def judge(room: Room) -> Verdict:
-    """Judge a room."""
+    """Judge a room: what is good needs no words."""
     graded = list(_graded(room))
     against = [text for grade, text in graded if grade is Grade.NOT_GOOD]
     doubts = [text for grade, text in graded if grade is Grade.USABLE]
@@ -93,20 +93,16 @@ def _of_points(room: Room) -> Iterator[tuple[Grade, str]]:
             "the marker is on the first spot, or the volume",
         )
         return
-    grade = _grade(volume.worst_point_mm, GOOD_POINT_MM, USABLE_POINT_MM)
-    if grade is not Grade.GOOD:
-        yield (
-            grade,
-            f"points in the volume are uncertain by up to {volume.worst_point_mm:.1f} mm, good is "
-            f"{GOOD_POINT_MM:.0f} mm: wave the marker longer and in more of the volume, tilted to all sides",
-        )
-    grade = _grade(-volume.visited, -GOOD_VISITED, -USABLE_VISITED)
-    if grade is not Grade.GOOD:
-        yield (
-            grade,
-            f"too little of the volume: the marker was in {100 * volume.visited:.0f} % of what two cameras see of it, "
-            f"good is {100 * GOOD_VISITED:.0f} %: wave it through all of it",
-        )
+    yield (
+        _grade(volume.worst_point_mm, GOOD_POINT_MM, USABLE_POINT_MM),
+        f"points in the volume are uncertain by up to {volume.worst_point_mm:.1f} mm, good is "
+        f"{GOOD_POINT_MM:.0f} mm: wave the marker longer and in more of the volume, tilted to all sides",
+    )
+    yield (
+        _grade(-volume.visited, -GOOD_VISITED, -USABLE_VISITED),
+        f"too little of the volume: the marker was in {100 * volume.visited:.0f} % of what two cameras see of it, "
+        f"good is {100 * GOOD_VISITED:.0f} %: wave it through all of it",
+    )
 
 
 def _of_held_out(room: Room) -> Iterator[tuple[Grade, str]]:
@@ -114,21 +110,17 @@ def _of_held_out(room: Room) -> Iterator[tuple[Grade, str]]:
     if not held_out.instants:
         yield Grade.NOT_GOOD, "nothing could be held out to judge by: wave the marker for 30 s or longer"
         return
-    grade = _grade(held_out.worst_spacing_mm, GOOD_SPACING_MM, USABLE_SPACING_MM)
-    if grade is not Grade.GOOD:
-        yield (
-            grade,
-            f"distances of balls err by up to {held_out.worst_spacing_mm:.1f} mm, good is {GOOD_SPACING_MM:.0f} mm: "
-            "check lenses (calibrate intrinsics), light and focus, and that no camera moved",
-        )
+    yield (
+        _grade(held_out.worst_spacing_mm, GOOD_SPACING_MM, USABLE_SPACING_MM),
+        f"distances of balls err by up to {held_out.worst_spacing_mm:.1f} mm, good is {GOOD_SPACING_MM:.0f} mm: "
+        "check lenses (calibrate intrinsics), light and focus, and that no camera moved",
+    )
     px = max(held_out.reprojection_px, held_out.epipolar_px)
-    grade = _grade(px, GOOD_PX, USABLE_PX)
-    if grade is not Grade.GOOD:
-        yield (
-            grade,
-            f"the cameras contradict each other by {px:.2f} px, good is {GOOD_PX:g} px: another lens or resolution "
-            "than calibrated, a camera that moved, or cameras in another order than the config's",
-        )
+    yield (
+        _grade(px, GOOD_PX, USABLE_PX),
+        f"the cameras contradict each other by {px:.2f} px, good is {GOOD_PX:g} px: another lens or resolution "
+        "than calibrated, a camera that moved, or cameras in another order than the config's",
+    )
     if held_out.wild > WILD_SHARE:
         yield (
             Grade.USABLE,
@@ -139,24 +131,20 @@ def _of_held_out(room: Room) -> Iterator[tuple[Grade, str]]:
 
 def _of_clocks(room: Room) -> Iterator[tuple[Grade, str]]:
     for c, camera in enumerate(room.cameras):
-        grade = _grade(room.clock_ms(c), GOOD_CLOCK_MS, USABLE_CLOCK_MS)
-        if grade is not Grade.GOOD:
-            yield (
-                grade,
-                f"{camera.name}: its clock is known to {room.clock_ms(c):.1f} ms, good is {GOOD_CLOCK_MS:g} ms: wave "
-                "the marker faster where it sees it",
-            )
+        yield (
+            _grade(room.clock_ms(c), GOOD_CLOCK_MS, USABLE_CLOCK_MS),
+            f"{camera.name}: its clock is known to {room.clock_ms(c):.1f} ms, good is {GOOD_CLOCK_MS:g} ms: wave "
+            "the marker faster where it sees it",
+        )
 
 
 def _of_footage(room: Room) -> Iterator[tuple[Grade, str]]:
     for camera, seen_s in zip(room.cameras, room.seen_s, strict=True):
-        grade = _grade(-seen_s, -GOOD_SEEN_S, -USABLE_SEEN_S)
-        if grade is not Grade.GOOD:
-            yield (
-                grade,
-                f"{camera.name}: saw the marker together with another camera for {seen_s:.1f} s, good is "
-                f"{GOOD_SEEN_S:.0f} s: wave it longer where two see it",
-            )
+        yield (
+            _grade(-seen_s, -GOOD_SEEN_S, -USABLE_SEEN_S),
+            f"{camera.name}: saw the marker together with another camera for {seen_s:.1f} s, good is "
+            f"{GOOD_SEEN_S:.0f} s: wave it longer where two see it",
+        )
 
 
 def _of_side(side: Side) -> Iterator[tuple[Grade, str]]:
