@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 
 from bridge.clock import Nanoseconds
 from bridge.dialect import Encoder, Identity
-from bridge.dialogue import Dialogue, DialogueState, Ear, Terms
+from bridge.dialogue import Dialogue, DialogueState, Ear, Tellings, Terms
 from bridge.links import Link, open_link
 from bridge.pack import MESSAGES, Packer
 from bridge.signing import Seal, Signing
@@ -25,19 +25,20 @@ class Spout:
     """One link and the talk over it.
 
     terms: of the talk.  encoder: the link's, which takes on the vehicle's system id if the terms name none.
-    signing: of both directions, None for none.
+    signing: of both directions, None for none.  tellings: of origins, shared by all links.
     """
 
     link: Link
     terms: Terms
     encoder: Encoder | None = None
     signing: Signing | None = None
+    tellings: Tellings = field(default_factory=Tellings)
     dialogue: Dialogue = field(init=False)
     ear: Ear | None = field(default=None, init=False)
 
     def __post_init__(self) -> None:
         """Begin the talk."""
-        self.dialogue = Dialogue(self.terms)
+        self.dialogue = Dialogue(self.terms, self.tellings)
 
     def hear(self) -> list[Received]:
         """Take in what has come since the last call, and return it."""
@@ -160,14 +161,14 @@ def open_outlet(
         OperatorError: a URI given twice, a message name not known, an id out of range, or a link that does not open.
     """
     _check(links)
-    packer = Packer(room_yaw_deg)
+    packer, tellings = Packer(room_yaw_deg), Tellings()
     spouts: list[Spout] = []
     try:
         for number, (uri, terms) in enumerate(links):
             known = DEFAULT_SYSTEM_ID if terms.vehicle_id is None else terms.vehicle_id
             signing = None if seal is None else seal.for_link(number)
             encoder = Encoder(Identity(known, component_id), signing)
-            spouts.append(Spout(open_link(uri, encoder, stopwatch), terms, encoder, signing))
+            spouts.append(Spout(open_link(uri, encoder, stopwatch), terms, encoder, signing, tellings))
     except OperatorError:
         for spout in spouts:
             spout.link.close()

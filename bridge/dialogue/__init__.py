@@ -2,7 +2,7 @@
 
 from bridge.dialogue.dialogue import Dialogue, DialogueState, Terms
 from bridge.dialogue.ear import Ear
-from bridge.dialogue.origin import Origin
+from bridge.dialogue.origin import Origin, Tellings
 from bridge.dialogue.profile import PROFILES, Profile
 
-__all__ = ["PROFILES", "Dialogue", "DialogueState", "Ear", "Origin", "Profile", "Terms"]
+__all__ = ["PROFILES", "Dialogue", "DialogueState", "Ear", "Origin", "Profile", "Tellings", "Terms"]

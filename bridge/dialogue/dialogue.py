@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from bridge.dialogue.heading import ATTITUDE, HeadingWatch
 from bridge.dialogue.news import Facts, News, Saturation
-from bridge.dialogue.origin import Origin, OriginKeeper
+from bridge.dialogue.origin import Origin, OriginKeeper, Tellings
 from bridge.dialogue.peer import Autopilot, Peer, PeerWatch
 from bridge.dialogue.profile import AUTO, Profile, kept_apart, profile_for
 from bridge.dialogue.streams import NOTHING, StreamKeeper, Wanted
@@ -112,13 +112,16 @@ class DialogueState:
 
 
 class Dialogue:
-    """One link's talk. It sends nothing itself: it says what is due."""
+    """One link's talk. It sends nothing itself: it says what is due.
 
-    def __init__(self, terms: Terms) -> None:
+    tellings: of origins, shared by the talks of one bridge; None for a talk alone.
+    """
+
+    def __init__(self, terms: Terms, tellings: Tellings | None = None) -> None:
         self._terms = terms
         self._watch = PeerWatch(terms.vehicle_id)
         self._sync = TimeSync()
-        self._origin = OriginKeeper(terms.origin)
+        self._origin = OriginKeeper(terms.origin, Tellings() if tellings is None else tellings)
         self._heading = HeadingWatch()
         self._streams = StreamKeeper(terms.streams)
         self._news = News()

@@ -12,7 +12,7 @@ from tracker.types import TrackState
 
 CALM_NS = 2_000_000_000
 BURST_NS = 500_000_000
-ORIGIN_TROUBLE = (OriginState.LOST, OriginState.MISSING, OriginState.REFUSED)
+ORIGIN_TROUBLE = (OriginState.LOST, OriginState.MISSING, OriginState.REFUSED, OriginState.UNCONFIRMED)
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,6 +25,7 @@ ANSWER_NS = 3_000_000_000  # within this an origin that was told must be there, 
 PROOF_NS = 15_000_000_000  # within this an autopilot with poses and an origin knows where on the globe it is
 EARTH_M = 6_371_000.0
 SAME_M = 1.0
+TRIES = 3  # an origin told so often without an answer is a trouble to speak of
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,31 +50,64 @@ class OriginState(StrEnum):
     ASKING = "asking the autopilot whether it has one"
     WAITING = "waiting for the autopilot's EKF"
     TOLD = "told, waiting for the autopilot to confirm"
+    TOLD_BY_ANOTHER = "told over another link, waiting for the autopilot to confirm"
     SET = "set"
     MISSING = "the autopilot has none and the config names none; add [origin] to the config"
     REFUSED = "the autopilot refuses it"
+    UNCONFIRMED = "told again and again, and the autopilot does not say that it has it; see whether the link loses much"
     LOST = "the autopilot acknowledged it and lost it; reboot the autopilot"
+
+
+class Tellings:
+    """Which system was told an origin, over whichever link: several may lead to one autopilot."""
+
+    def __init__(self) -> None:
+        self._last_ns: dict[int, int] = {}
+        self._acknowledged: set[int] = set()
+
+    def enter(self, system_id: int, now_ns: int) -> None:
+        """Enter that a system is told now."""
+        self._last_ns[system_id] = now_ns
+
+    def acknowledge(self, system_id: int) -> None:
+        """Enter that a system has taken what it was told."""
+        self._acknowledged.add(system_id)
+
+    def forget(self, system_id: int) -> None:
+        """Enter that a system has started anew."""
+        self._last_ns.pop(system_id, None)
+        self._acknowledged.discard(system_id)
+
+    def forbid(self, system_id: int, now_ns: int) -> bool:
+        """Say whether a system is not to be told: it has taken one, or its answer to the last may still come."""
+        last_ns = self._last_ns.get(system_id)
+        return system_id in self._acknowledged or (last_ns is not None and now_ns - last_ns <= ANSWER_NS)
 
 
 class OriginKeeper:
     """See that the autopilot has an origin.
 
-    origin: to tell it, None for none.  found: what it says it has.
+    origin: to tell it, None for none.  tellings: shared by all links.  found: what the autopilot says it has.
     """
 
-    def __init__(self, origin: Origin | None) -> None:
+    def __init__(self, origin: Origin | None, tellings: Tellings) -> None:
         self._origin = origin
+        self._tellings = tellings
+        self._system_id: int | None = None
         self._plain = False  # by SET_GPS_GLOBAL_ORIGIN, since the command is not known there
         self.start_anew()
 
     def start_anew(self) -> None:
         """Forget what the autopilot said: it has only just started."""
+        if self._system_id is not None:
+            self._tellings.forget(self._system_id)
         self.found: Origin | None = None
         self.state = OriginState.ASKING
         self._ekf_ready = self._proved = False
         self._asked_ns: int | None = None
         self._since_ns: int | None = None  # the state's beginning
-        self._told = False
+        self._told = self._acknowledged = False
+        self._unconfirmed = 0  # tellings in a row of which nothing was heard
 
     @property
     def settled(self) -> bool:
@@ -95,7 +129,7 @@ class OriginKeeper:
         """Return what is to be asked or told now."""
         if self._asked_ns is not None and now_ns - self._asked_ns < ASK_NS:
             return []
-        self._asked_ns = now_ns
+        self._asked_ns, self._system_id = now_ns, peer.system_id
         if self._since_ns is None:
             self._since_ns = now_ns
         if self.settled:
@@ -103,18 +137,27 @@ class OriginKeeper:
         messages = [_request(peer, "GPS_GLOBAL_ORIGIN", now_ns)]
         if peer.autopilot is Autopilot.ARDUPILOT and not self._ekf_ready:
             messages.append(_request(peer, "EKF_STATUS_REPORT", now_ns))
-        waited_ns = now_ns - self._since_ns
-        if self._told:
-            if waited_ns > ANSWER_NS and self.state is OriginState.TOLD:
-                self.state = OriginState.LOST
+        return messages + self._tell_if_due(peer, now_ns, now_ns - self._since_ns)
+
+    def _tell_if_due(self, peer: Peer, now_ns: int, waited_ns: int) -> list[Message]:
+        """Tell the origin once it was asked for in vain; what hinders that becomes the state."""
+        if self._told and (self._acknowledged or waited_ns <= ANSWER_NS):
+            self.state = OriginState.LOST if waited_ns > ANSWER_NS else self.state
         elif self._origin is None:
             self.state = OriginState.MISSING if waited_ns >= ANSWER_NS else self.state
         elif peer.autopilot is Autopilot.ARDUPILOT and not self._ekf_ready:
             self.state = OriginState.WAITING
-        elif waited_ns >= (ANSWER_NS if self.state is OriginState.REFUSED else ASK_NS):  # it was asked and has none
-            self._told, self._since_ns, self.state = True, now_ns, OriginState.TOLD
-            messages.append(self._tell(peer, self._origin, now_ns))
-        return messages
+        elif waited_ns < (ANSWER_NS if self.state is OriginState.REFUSED else ASK_NS):
+            return []
+        elif self._tellings.forbid(peer.system_id, now_ns):
+            self.state = OriginState.TOLD_BY_ANOTHER
+        else:
+            self._tellings.enter(peer.system_id, now_ns)
+            self._told, self._since_ns = True, now_ns
+            self._unconfirmed += 1
+            self.state = OriginState.TOLD if self._unconfirmed <= TRIES else OriginState.UNCONFIRMED
+            return [self._tell(peer, self._origin, now_ns)]
+        return []
 
     def _prove(self, peer: Peer, now_ns: int) -> list[Message]:
         """Ask where an autopilot that has an origin says it is: nowhere means that the origin got lost in it."""
@@ -143,7 +186,13 @@ class OriginKeeper:
     def _take_acknowledgement(self, ack: Received) -> None:
         """Take the answer to the command; one that is refused is told again later, by the message if need be."""
         result = ack.whole("result")
-        if self.settled or not self._told or result == enum("MAV_RESULT_ACCEPTED"):
+        if self.settled or not self._told:
+            return
+        self._unconfirmed = 0
+        if result == enum("MAV_RESULT_ACCEPTED"):
+            self._acknowledged = True
+            if self._system_id is not None:
+                self._tellings.acknowledge(self._system_id)
             return
         self._told, self._since_ns = False, ack.arrived_ns
         unknown = result == enum("MAV_RESULT_UNSUPPORTED")

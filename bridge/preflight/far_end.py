@@ -98,6 +98,9 @@ def origin_line(state: DialogueState, hearing: Hearing, configured: bool) -> Lin
         return Line(Mark.FAIL, what, "none, and the config names none", needed, fix)
     if state.origin in (OriginState.LOST, OriginState.REFUSED):
         return Line(Mark.FAIL, what, state.origin, needed, "reboot the autopilot: the bridge then tells it anew")
+    if state.origin == OriginState.UNCONFIRMED:
+        fix = "see how much the link loses, or set the origin on the ground station's map"
+        return Line(Mark.FAIL, what, state.origin, needed, fix)
     fix = "wait until its filter has started (keep it still), then check again"
     return Line(Mark.FAIL if configured else Mark.UNKNOWN, what, state.origin, needed, fix)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from bridge.dialect import enum
-from bridge.dialogue.origin import DO_SET_GLOBAL_ORIGIN, Origin, OriginKeeper, OriginState
+from bridge.dialogue.origin import DO_SET_GLOBAL_ORIGIN, Origin, OriginKeeper, OriginState, Tellings
 from bridge.dialogue.peer import Autopilot, Peer
 from bridge.wire import Message
 from tests.bridge.dialogue.far_autopilot import BASE_NS, from_autopilot
@@ -23,7 +23,7 @@ class Autopilots:
         self.keeper = keeper
         self.ekf_s, self.has = ekf_s, has
         self.result = enum("MAV_RESULT_ACCEPTED")
-        self.loses = False
+        self.loses = self.deaf = False
         self.told: list[Message] = []
         self.now_ns = BASE_NS
 
@@ -45,6 +45,8 @@ class Autopilots:
         command, arrived_ns = message.fields.get("command"), self.now_ns + 1_000_000
         if message.name == "SET_GPS_GLOBAL_ORIGIN" or command == DO_SET_GLOBAL_ORIGIN:
             self.told.append(message)
+            if self.deaf:
+                return
             if command == DO_SET_GLOBAL_ORIGIN:
                 self.keeper.take(
                     from_autopilot("COMMAND_ACK", arrived_ns, command=DO_SET_GLOBAL_ORIGIN, result=self.result)
@@ -68,7 +70,7 @@ class Autopilots:
 
 
 def test_it_is_told_once_and_only_after_the_ekf_stands() -> None:
-    pilot = Autopilots(OriginKeeper(PLACE), ekf_s=4.2)
+    pilot = Autopilots(OriginKeeper(PLACE, Tellings()), ekf_s=4.2)
     pilot.fly(4.0)
     assert not pilot.told
     assert pilot.state() is OriginState.WAITING
@@ -82,7 +84,7 @@ def test_it_is_told_once_and_only_after_the_ekf_stands() -> None:
 
 
 def test_an_autopilot_that_has_one_is_told_none() -> None:
-    pilot = Autopilots(OriginKeeper(PLACE), has=Origin(10.0, 20.0, 5.0))
+    pilot = Autopilots(OriginKeeper(PLACE, Tellings()), has=Origin(10.0, 20.0, 5.0))
     pilot.fly(10.0)
     assert not pilot.told
     assert pilot.keeper.found == Origin(10.0, 20.0, 5.0)
@@ -90,7 +92,7 @@ def test_an_autopilot_that_has_one_is_told_none() -> None:
 
 
 def test_where_the_command_is_not_known_the_message_does_it() -> None:
-    pilot = Autopilots(OriginKeeper(PLACE))
+    pilot = Autopilots(OriginKeeper(PLACE, Tellings()))
     pilot.result = enum("MAV_RESULT_UNSUPPORTED")
     pilot.fly(8.0)
     assert [message.name for message in pilot.told] == ["COMMAND_INT", "SET_GPS_GLOBAL_ORIGIN"]
@@ -98,7 +100,7 @@ def test_where_the_command_is_not_known_the_message_does_it() -> None:
 
 
 def test_a_refused_one_is_told_again_later() -> None:
-    pilot = Autopilots(OriginKeeper(PLACE))
+    pilot = Autopilots(OriginKeeper(PLACE, Tellings()))
     pilot.result = enum("MAV_RESULT_FAILED")
     pilot.fly(3.5)
     assert pilot.state() is OriginState.REFUSED
@@ -109,8 +111,43 @@ def test_a_refused_one_is_told_again_later() -> None:
     assert pilot.state() is OriginState.SET
 
 
+def test_one_that_got_lost_on_its_way_is_told_again_and_in_the_end_spoken_of() -> None:
+    pilot = Autopilots(OriginKeeper(PLACE, Tellings()))
+    pilot.deaf = True
+    pilot.fly(6.0)
+    assert pilot.state() is OriginState.TOLD
+    assert len(pilot.told) == 2
+    pilot.fly(14.0)
+    assert pilot.state() is OriginState.UNCONFIRMED
+    pilot.deaf = False
+    pilot.fly(6.0)
+    assert pilot.state() is OriginState.SET
+
+
+def test_one_autopilot_at_the_end_of_two_links_is_told_over_one_of_them() -> None:
+    tellings = Tellings()
+    first, second = (Autopilots(OriginKeeper(PLACE, tellings)) for _ in range(2))
+    for _ in range(80):  # the second never sees the first's origin
+        first.fly(0.1)
+        second.fly(0.1)
+    assert (len(first.told), len(second.told)) == (1, 0)
+    assert second.state() is OriginState.TOLD_BY_ANOTHER
+    second.has = first.has
+    second.fly(2.0)
+    assert second.state() is OriginState.SET
+
+
+def test_two_autopilots_at_the_ends_of_two_links_are_both_told() -> None:
+    tellings = Tellings()
+    first, second = (Autopilots(OriginKeeper(PLACE, tellings)) for _ in range(2))
+    first.fly(5.0)
+    second.fly(5.0, Peer(2, 1, Autopilot.ARDUPILOT))
+    assert first.settled()
+    assert second.settled()
+
+
 def test_one_that_was_acknowledged_and_lost_is_found_out() -> None:
-    pilot = Autopilots(OriginKeeper(PLACE))
+    pilot = Autopilots(OriginKeeper(PLACE, Tellings()))
     pilot.loses = True
     pilot.fly(10.0)
     assert pilot.state() is OriginState.SET
@@ -120,14 +157,14 @@ def test_one_that_was_acknowledged_and_lost_is_found_out() -> None:
 
 
 def test_without_one_in_the_config_nothing_is_told_and_it_says_so() -> None:
-    pilot = Autopilots(OriginKeeper(None))
+    pilot = Autopilots(OriginKeeper(None, Tellings()))
     pilot.fly(5.0)
     assert not pilot.told
     assert pilot.state() is OriginState.MISSING
 
 
 def test_after_a_reboot_it_is_told_again() -> None:
-    pilot = Autopilots(OriginKeeper(PLACE))
+    pilot = Autopilots(OriginKeeper(PLACE, Tellings()))
     pilot.fly(5.0)
     pilot.has = None
     pilot.keeper.start_anew()
@@ -138,7 +175,7 @@ def test_after_a_reboot_it_is_told_again() -> None:
 
 
 def test_a_px4_is_told_altitude_0_since_its_height_would_jump_by_any_other() -> None:
-    far = Autopilots(OriginKeeper(PLACE))
+    far = Autopilots(OriginKeeper(PLACE, Tellings()))
     far.fly(3.0, Peer(1, 1, Autopilot.PX4))
     (told,) = far.told
     assert told.name == "SET_GPS_GLOBAL_ORIGIN"
