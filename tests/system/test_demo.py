@@ -6,6 +6,8 @@ import io
 import itertools
 import json
 from collections import Counter
+from pathlib import Path
+from typing import Any
 
 import cv2
 import pytest
@@ -13,19 +15,34 @@ from rich.console import Console
 
 from bridge.log.reader import LogReader
 from tools.demo import LOG, PLOT, SUMMARY, VERDICT, DemoResult, run_demo
-from tools.request import Clocks, DemoRequest, Pace
+from tools.replay import grounded, met_autopilot, settings_of
+from tools.request import Clocks, DemoRequest, FrameFormat, Pace, RunRequest
+from tools.session import run_session
 
 DURATION_S = 16.0
 FRAME_NS = 66_666_667 * 3 // 2
 
 
+def ticking() -> Clocks:
+    """Return clocks that go on a microsecond whenever they are read."""
+    reading = itertools.count(1, 1000)
+    return Clocks(lambda: next(reading), lambda: next(reading), lambda: 0, lambda _: None)
+
+
+def talk(log: Path) -> list[tuple[str, int, Any]]:
+    """Return what was said both ways, and what was known of the autopilot and its clock."""
+    return [
+        (record.topic, record.log_ns, record.value.get("raw") or {**record.value, "link": ""})
+        for record in LogReader(log).records()
+        if record.topic.startswith("/mavlink/") or record.topic in ("/timesync", "/autopilot")
+    ]
+
+
 @pytest.fixture(scope="module")
 def result(tmp_path_factory: pytest.TempPathFactory) -> DemoResult:
     """Fly once for all tests here, as fast as it goes."""
-    reading = itertools.count(1, 1000)
-    clocks = Clocks(lambda: next(reading), lambda: next(reading), lambda: 0, lambda _: None)
-    request = DemoRequest(DURATION_S, 1, tmp_path_factory.mktemp("demo"), Pace.FAST)
-    return run_demo(request, clocks, Console(file=io.StringIO()))
+    request = DemoRequest(DURATION_S, 1, tmp_path_factory.mktemp("demo"), Pace.FAST, FrameFormat.PNG)
+    return run_demo(request, ticking(), Console(file=io.StringIO()))
 
 
 def test_the_helicopter_holds_its_path_on_what_the_bridge_sends(result: DemoResult) -> None:
@@ -58,3 +75,13 @@ def test_the_log_holds_what_the_autopilot_was_asked_to_tell_and_how_to_align_its
     late_ns = [value["arrived_ns"] - value["autopilot_ns"] - offset_ns for value in attitudes]
     assert max(map(abs, late_ns)) < FRAME_NS  # time stands still between two frames of the cameras
     assert (result.out / LOG).with_suffix(".tlog").stat().st_size > 100_000
+
+
+def test_a_replay_carries_on_the_whole_talk_again_to_the_byte(result: DemoResult, tmp_path: Path) -> None:
+    flown, again = result.out / LOG, tmp_path / "again.mcap"
+    settings = grounded(settings_of(flown).with_frames("off", None), answered=met_autopilot(flown))
+    request = RunRequest(settings, f"log:{flown}", again, Pace.FAST, None, overwrite=False, quiet=True)
+    run_session(request, ticking())
+    said = talk(flown)
+    assert {topic for topic, _, _ in said} >= {"/timesync", "/autopilot", "/mavlink/sent/COMMAND_INT"}
+    assert talk(again) == said
