@@ -13,7 +13,8 @@ import cv2
 import pytest
 from rich.console import Console
 
-from bridge.log.reader import LogReader
+from bridge.log.reader import LogReader, Record
+from tests.system.layouts import PANELS, curves, found, foxglove_layout, named_topics, series, shown
 from tools.demo import LOG, PLOT, SUMMARY, VERDICT, DemoResult, run_demo
 from tools.replay import grounded, met_autopilot, settings_of
 from tools.request import Clocks, DemoRequest, FrameFormat, Pace, RunRequest
@@ -45,6 +46,11 @@ def result(tmp_path_factory: pytest.TempPathFactory) -> DemoResult:
     return run_demo(request, ticking(), Console(file=io.StringIO()))
 
 
+@pytest.fixture(scope="module")
+def records(result: DemoResult) -> list[Record]:
+    return list(LogReader(result.out / LOG).records())
+
+
 def test_the_helicopter_holds_its_path_on_what_the_bridge_sends(result: DemoResult) -> None:
     missed = [line for line in result.verdict.lines if not line.passed]
     assert not missed
@@ -65,8 +71,9 @@ def test_log_summary_verdict_and_picture_lie_in_the_folder(result: DemoResult) -
     assert picture.shape[1] > 1000
 
 
-def test_the_log_holds_what_the_autopilot_was_asked_to_tell_and_how_to_align_its_clock(result: DemoResult) -> None:
-    records = list(LogReader(result.out / LOG).records())
+def test_the_log_holds_what_the_autopilot_was_asked_to_tell_and_how_to_align_its_clock(
+    result: DemoResult, records: list[Record]
+) -> None:
     counts = Counter(record.topic for record in records)
     for name in ("SERVO_OUTPUT_RAW", "RC_CHANNELS", "ATTITUDE", "LOCAL_POSITION_NED", "RAW_IMU"):
         assert counts[f"/mavlink/received/{name}"] > 40 * DURATION_S
@@ -85,3 +92,32 @@ def test_a_replay_carries_on_the_whole_talk_again_to_the_byte(result: DemoResult
     said = talk(flown)
     assert {topic for topic, _, _ in said} >= {"/timesync", "/autopilot", "/mavlink/sent/COMMAND_INT"}
     assert talk(again) == said
+
+
+def test_the_foxglove_layout_shows_every_panel_once_and_kinds_that_viewers_have() -> None:
+    layout = foxglove_layout()
+    assert sorted(shown(layout["layout"])) == sorted(layout["configById"])
+    assert {name.partition("!")[0] for name in layout["configById"]} == PANELS
+
+
+def test_the_foxglove_layout_names_only_what_the_log_holds(records: list[Record]) -> None:
+    panels = foxglove_layout()["configById"]
+    assert set().union(*map(named_topics, panels.values())) <= {record.topic for record in records}
+    for name, panel in panels.items():
+        kind = str | bool if name.startswith("StateTransitions") else int | float
+        for path in (one["value"] for one in panel.get("paths", ())):
+            values = found(records, path)
+            assert values, path
+            assert all(isinstance(value, kind) for value in values), path
+
+
+def test_the_foxglove_layout_follows_frames_that_the_log_draws(records: list[Record]) -> None:
+    drawn = {child.child_frame_id for one in records if one.topic == "/tf/cameras" for child in one.value.transforms}
+    followed = {panel["followTf"] for panel in foxglove_layout()["configById"].values() if "followTf" in panel}
+    assert drawn | {"room"} >= followed > {"room"}
+
+
+def test_the_plotjuggler_layout_plots_only_series_that_the_log_holds(records: list[Record]) -> None:
+    held = {name for record in records for name in series(record)}
+    missing = set(curves()) - held
+    assert not missing
