@@ -40,6 +40,7 @@ def film_of(path: Path, events: list[Event], terms: FilmTerms, **options: bool) 
         for k, event in enumerate(events):
             log.take(event, SEARCHING, (), 2_000 + k)
         log.take(None, SEARCHING, (), 9_000)
+        log.take(None, SEARCHING, (), 9_500)
     return list(LogSource(path, lambda: 7))
 
 
@@ -77,7 +78,7 @@ def test_a_replay_knows_when_the_flight_took_each_event(tmp_path: Path) -> None:
     film_of(tmp_path / "a.mcap", [*flight(2), Silence(1_400)], PNG)
     source = LogSource(tmp_path / "a.mcap", lambda: 0)
     assert [source.now_ns for _ in source] == [2_000, 2_001, 2_002]
-    assert source.now_ns == 9_000, "the end has its time too"
+    assert source.now_ns == 9_000, "the end has its time too, and the closing of the links is none"
 
 
 def test_what_came_in_comes_in_again_before_the_turn_that_took_it_at_its_own_time(tmp_path: Path) -> None:
