@@ -45,7 +45,7 @@ class Hearer:
         self._links: dict[str, tuple[int, LinkState]] = {}
 
     def take(self, outlet: Outlet, now_ns: int, *, last: bool = False) -> Heard:
-        """Return what is new at stream time now_ns [ns]; last: nothing comes after this, so counts are told too."""
+        """Return what is new at stream time now_ns [ns]; last: nothing comes after this, so all is told."""
         came = outlet.received()
         received, left_out = came[-MOST:], max(0, len(came) - MOST)
         due = last or self._due_ns is None or not 0 <= self._due_ns - now_ns <= LOOK_NS
@@ -77,7 +77,7 @@ class Hearer:
             bare = replace(state, sync=None)
             at_ns, told = self._far_ends.get(link, (0, None))
             only_counts = told is not None and _without_counts(bare) == _without_counts(told)
-            if bare != told and (last or not only_counts or now_ns - at_ns >= COUNTS_NS):
+            if last or (bare != told and (not only_counts or now_ns - at_ns >= COUNTS_NS)):
                 self._far_ends[link] = now_ns, bare
                 changed.append((link, bare))
         return changed
@@ -87,7 +87,7 @@ class Hearer:
         for state in states:
             at_ns, told = self._links.get(state.name, (0, None))
             only_counts = told is not None and (state.up, state.reason) == (told.up, told.reason)
-            if state != told and (last or not only_counts or now_ns - at_ns >= COUNTS_NS):
+            if last or (state != told and (not only_counts or now_ns - at_ns >= COUNTS_NS)):
                 self._links[state.name] = now_ns, state
                 news.append(state)
         return tuple(news)

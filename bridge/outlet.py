@@ -9,7 +9,7 @@ from dataclasses import dataclass, field, replace
 from bridge.clock import Nanoseconds
 from bridge.dialect import Encoder, Identity
 from bridge.dialogue import Dialogue, DialogueState, Ear, Tellings, Terms
-from bridge.links import Link, open_link
+from bridge.links import Deliver, Link, MemoryLink, open_link
 from bridge.pack import MESSAGES, Packer
 from bridge.signing import Seal, Signing
 from bridge.wire import LinkState, Message, Received, Sent
@@ -104,6 +104,10 @@ class Outlet:
                     spout.link.send(packed[name])
             self._watch(estimate, now_ns)
         return self._sent()
+
+    def inlets(self) -> dict[str, Deliver]:
+        """Return what lets bytes come in on each link that ends in this process, by its URI."""
+        return {spout.link.name: spout.link.deliver for spout in self._spouts if isinstance(spout.link, MemoryLink)}
 
     def say(self, messages: Iterable[Message]) -> None:
         """Send messages that are no poses, over every link."""

@@ -9,25 +9,23 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 from rich.console import Console
 
 from bridge.clock import Clock, HostClock, StreamClock
 from bridge.monitor import Monitor
-from bridge.outlet import Outlet, open_outlet
 from bridge.pace import Paced
 from bridge.run import Outlets, Steps, close, run
 from bridge.settings import Settings, load_settings, rig_of
-from bridge.settings.terms import terms_of
 from bridge.status import StatusLine
 from bridge.summary import Summary, to_text
 from bridge.wire import Sent
 from tools.demo_plot import draw_flight
 from tools.request import Clocks, DemoRequest, Pace
 from tools.seen_picture import draw_seen
-from tools.session import recorder_of, telemetry_of, tracker_of
+from tools.session import links_of, recorder_of, telemetry_of, tracker_of
 from tools.simulate.autopilot.vessel import Mode
 from tools.simulate.flight import Flight, flight_of
 from tools.simulate.helicopter import Helicopter
@@ -45,7 +43,7 @@ from tracker.types import Estimate, Event, Frame, Step
 LOG, SUMMARY, VERDICT, PLOT, SEEN = "flight.mcap", "summary.json", "verdict.json", "flight.png", "seen.png"
 DEMO_CONFIG = "lab"
 _RATE_HZ = 15.0
-_PATIENCE_NS = 3_600_000_000_000  # the world waits while this computer is busy, so a pose is never as old as it seems
+_PATIENCE_MS = 3_600_000.0  # the world waits while this computer is busy, so a pose is never as old as it seems
 _TALK_S = 10.0
 """At most so long may bridge and autopilot talk before the flight: of the origin, until the filter trusts the poses."""
 
@@ -158,6 +156,7 @@ def fly(
     request: DemoRequest, clocks: Clocks, settings: Settings, world: World, console: Console
 ) -> tuple[_Witness, Summary]:
     """Run the loop once around."""
+    settings = _as_flown(settings, request, world)
     rig = rig_of(settings, None).rig
     timing = SimTiming(_RATE_HZ, request.duration_s + _TALK_S, START_NS, delay_ns=world.surroundings.delay_ns)
     log = request.out / LOG
@@ -165,7 +164,7 @@ def fly(
         source = stack.enter_context(SimSource(rig, world, clocks.stopwatch, timing, seed=request.seed))
         halfway_ns = START_NS + round(request.duration_s / 2.0 * 1e9)
         witness = _Witness(tracker_of(settings, rig, clocks), world, rig, halfway_ns)
-        outlet = _outlet(settings, world, clocks)
+        outlet = links_of(settings, clocks, logged=True)
         stack.callback(outlet.close)
         about = {"source": "demo", "pace": request.pace.value, "seed": str(request.seed)}
         fast = request.pace is Pace.FAST
@@ -208,15 +207,12 @@ def _until_landed(source: SimSource, world: World) -> Iterator[Event]:
                 return
 
 
-def _outlet(settings: Settings, world: World, clocks: Clocks) -> Outlet:
-    """Open the one link: to the simulated autopilot, in place of those the config names."""
-    ((_, terms),) = terms_of(settings.with_links(("demo",)), logged=True)
-    return open_outlet(
-        [(f"udpout:127.0.0.1:{world.autopilot.port}", replace(terms, max_age_ns=_PATIENCE_NS))],
-        component_id=settings.mavlink.component_id,
-        room_yaw_deg=world.surroundings.room_yaw_deg,
-        stopwatch=clocks.stopwatch,
-    )
+def _as_flown(settings: Settings, request: DemoRequest, world: World) -> Settings:
+    """Return the settings of this flight, as its log is to hold them: one link, to the simulated autopilot."""
+    room = settings.room.model_copy(update={"room_yaw_deg": world.surroundings.room_yaw_deg})
+    mavlink = settings.mavlink.model_copy(update={"max_age_ms": _PATIENCE_MS})
+    linked = settings.with_links((f"udpout:127.0.0.1:{world.autopilot.port}",)).with_frames(request.frames, None)
+    return linked.model_copy(update={"room": room, "mavlink": mavlink})
 
 
 def make_folder(out: Path) -> None:

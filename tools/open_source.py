@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from bridge.clock import Clock, ReplayClock
+from bridge.links import Deliver
 from bridge.log.footage import LogSource
 from bridge.settings import ChosenRig, Settings, rig_of
 from bridge.settings.models import CameraSettings
@@ -29,6 +30,8 @@ class OpenedSource:
     warnings: one line each for what the operator should know but need not mend.
     clock: the stream time of a source that knows its own, for pace `fast`; None for that of its frames.
     troubles: gives more such lines once the source has ended.
+    reconnect: lets what the links of a logged flight received come in again, at that clock's pace, given the inlets of
+        those that end in this process, by URI.
     """
 
     source: Source
@@ -37,6 +40,7 @@ class OpenedSource:
     warnings: tuple[str, ...] = ()
     clock: Clock | None = None
     troubles: Callable[[], tuple[str, ...]] = tuple
+    reconnect: Callable[[Mapping[str, Deliver]], object] = dict
 
 
 def open_source(text: str, settings: Settings, clocks: Clocks) -> OpenedSource:
@@ -83,7 +87,14 @@ def _open_simulation(uri: SourceUri, settings: Settings, clocks: Clocks) -> Open
 def _open_log(uri: SourceUri, settings: Settings, clocks: Clocks) -> OpenedSource:
     source = LogSource(Path(uri.argument), clocks.stopwatch)
     chosen = rig_of(settings, source.cameras, source.camera_count)
-    return OpenedSource(source, chosen, False, clock=ReplayClock(source), troubles=lambda: source.troubles)
+    return OpenedSource(
+        source,
+        chosen,
+        live=False,
+        clock=ReplayClock(source),
+        troubles=lambda: source.troubles,
+        reconnect=source.deliver_to,
+    )
 
 
 def _doubts(chosen: ChosenRig) -> tuple[str, ...]:

@@ -6,8 +6,10 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from bridge.links import on_paper
 from bridge.log.reader import LogReader
-from bridge.settings import LinkSettings, Settings
+from bridge.log.received import AUTOPILOT
+from bridge.settings import Settings
 from tracker.errors import OperatorError
 
 CONFIG_ATTACHMENT = "config.json"
@@ -33,14 +35,18 @@ def settings_of(log: Path) -> Settings:
     return settings.model_copy(update={"rig": settings.rig.model_copy(update={"calibration": ""})})
 
 
-def on_paper(settings: Settings) -> Settings:
+def met_autopilot(log: Path) -> bool:
+    """Say whether a log's flight heard an autopilot."""
+    return any(record.value["heard"] for record in LogReader(log).records({AUTOPILOT.name}))
+
+
+def grounded(settings: Settings, *, answered: bool) -> Settings:
     """Return settings whose links end in this process: a replay must reach no autopilot by itself.
 
-    Nothing is signed, and no origin told: with nobody there to answer, an ArduPilot's poses would wait for it for ever.
+    Nothing is signed. answered: an autopilot's answers come in again; without, no origin is told, for which an
+    ArduPilot's poses would wait for ever.
     """
-    links = tuple(
-        LinkSettings.model_construct(uri=f"memory:{link.uri.replace(':', '/')}", messages=link.messages)
-        for link in settings.links
-    )
+    links = tuple(link.model_copy(update={"uri": on_paper(link.uri)}) for link in settings.links)
     mavlink = settings.mavlink.model_copy(update={"signing_key": ""})
-    return settings.model_copy(update={"links": links, "mavlink": mavlink, "origin": None})
+    origin = settings.origin if answered else None
+    return settings.model_copy(update={"links": links, "mavlink": mavlink, "origin": origin})

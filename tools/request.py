@@ -79,7 +79,7 @@ class RunRequest:
 
 @dataclass(frozen=True, slots=True)
 class DemoRequest:
-    """One demo flight of `duration_s` [s]; its files go to the folder `out`.
+    """One demo flight of `duration_s` [s]; its files go to the folder `out`, its frames into the log if wanted.
 
     Raises:
         OperatorError: a duration outside 15 to 3600 s, or a negative seed.
@@ -89,6 +89,7 @@ class DemoRequest:
     seed: int
     out: Path
     pace: Pace
+    frames: FrameFormat | None = None
 
     def __post_init__(self) -> None:
         if not (math.isfinite(self.duration_s) and SHORTEST_DEMO_S <= self.duration_s <= LONGEST_DEMO_S):

@@ -67,6 +67,8 @@ def run_session(request: RunRequest, clocks: Clocks) -> None:
         telemetry = telemetry_of(request.source, request.settings, opened.chosen.rig, monitor, clocks)
         outlets = Outlets(outlet, monitor, recorder, status, telemetry)
         stack.enter_context(steady())
+        if request.pace is Pace.FAST:
+            opened.reconnect(outlet.inlets())
         events, clock = _paced(opened, request.pace, clocks)  # last: from here on a recording's time runs
         refused = False
         try:

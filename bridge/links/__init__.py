@@ -8,14 +8,14 @@ from typing import Protocol
 
 from bridge.clock import Nanoseconds
 from bridge.links.ledger import Encode, Ledger
-from bridge.links.memory import MemoryLink
+from bridge.links.memory import Deliver, MemoryLink
 from bridge.links.serial import open_serial
 from bridge.links.tcp import open_tcp
 from bridge.links.udp import UdpInLink, UdpOutLink
-from bridge.links.uri import FORMS, Address, line_bytes_s, parse
+from bridge.links.uri import FORMS, Address, line_bytes_s, on_paper, parse
 from bridge.wire import LinkState, Message, Sent
 
-__all__ = ["FORMS", "Encode", "Link", "MemoryLink", "line_bytes_s", "open_link", "parse"]
+__all__ = ["FORMS", "Deliver", "Encode", "Link", "MemoryLink", "line_bytes_s", "on_paper", "open_link", "parse"]
 
 
 class Link(Protocol):

@@ -10,6 +10,8 @@ from bridge.links.uri import Address
 from bridge.wire import LinkState, Message, Sent
 
 _KEPT_FRAMES = 65536
+Deliver = Callable[[bytes], None]
+"""Lets bytes come in."""
 
 
 class MemoryLink:

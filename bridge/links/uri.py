@@ -8,6 +8,7 @@ from tracker.errors import OperatorError
 
 BITS_PER_BYTE = 10  # on a serial line: a start bit, eight data bits, a stop bit
 FORMS = "udpout:HOST:PORT, udpin:HOST:PORT, serial:DEVICE:BAUD, tcp:HOST:PORT"
+_MEMORY = "memory:"
 _NUMBERED = ("udpout", "udpin", "serial", "tcp")
 
 
@@ -41,9 +42,17 @@ def parse(uri: str) -> Address:
     return Address(uri, scheme, place.strip("[]") if scheme != "serial" else place, number)
 
 
+def on_paper(uri: str) -> str:
+    """Return the URI of the link that ends in this process in another's place, its own name for one that does."""
+    return uri if uri.startswith(_MEMORY) else _MEMORY + uri
+
+
 def line_bytes_s(uri: str) -> float | None:
-    """Return what a link's line carries each way by its URI [B/s]; None where that is no limit, or not known."""
-    scheme, _, rest = uri.partition(":")
+    """Return what a link's line carries each way by its URI [B/s]; None where that is no limit, or not known.
+
+    A link on paper counts as the one it stands for.
+    """
+    scheme, _, rest = uri.removeprefix(_MEMORY).partition(":")
     baud = _whole_number(rest.rpartition(":")[2])
     return None if scheme != "serial" or baud is None or baud <= 0 else baud / BITS_PER_BYTE
 

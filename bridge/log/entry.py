@@ -100,8 +100,12 @@ def latency_value(estimate: Estimate, sent: tuple[Sent, ...]) -> Value:
             links[one.link] = max(links.get(one.link, 0), one.sent_ns - one.available_ns)
     return {
         "t_ns": estimate.t_ns,
-        "stages": [{"name": name, "duration_ns": took} for name, took in estimate.stages_ns.items()],
-        "links": [{"link": link, "latency_ns": latency} for link, latency in links.items()],
+        "stages": [
+            {"name": name, "duration_ns": took, "duration_ms": took / 1e6} for name, took in estimate.stages_ns.items()
+        ],
+        "links": [
+            {"link": link, "latency_ns": latency, "latency_ms": latency / 1e6} for link, latency in links.items()
+        ],
     }
 
 

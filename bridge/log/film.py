@@ -72,7 +72,8 @@ class Film:
 
     def __init__(self, terms: FilmTerms) -> None:
         self._terms = terms
-        self._admitted = 0  # by the loop's thread
+        self._ended = False  # by the loop's thread
+        self._admitted = 0
         self._missed = 0
         self._done = 0  # the rest by the writing one
         self._stored = 0
@@ -80,12 +81,13 @@ class Film:
         self._full = False
 
     def admit(self, event: Event | None, *, wait: bool) -> Frame | Mark | None:
-        """Return what the log is to keep of an event, None once the budget is used up.
+        """Return what the log is to keep of an event, None once the budget is used up, or behind the end.
 
         event: None at the end of all events.  wait: whether the loop waits for the log, so that nothing is missed.
         """
-        if self._full:
+        if self._full or self._ended:
             return None
+        self._ended = event is None
         if not isinstance(event, Frame):
             return _mark(event)
         if not wait and self._admitted - self._done >= WAITING_FRAMES:

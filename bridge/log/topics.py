@@ -148,11 +148,17 @@ LATENCY = json_topic(
     "/latency",
     "posebridge.Latency",
     t_ns=integer("stream time of the estimate [ns]"),
-    stages=each("tracker stages", name=text("stage"), duration_ns=integer("stopwatch time it took [ns]")),
+    stages=each(
+        "tracker stages",
+        name=text("stage"),
+        duration_ns=integer("stopwatch time it took [ns]"),
+        duration_ms=number("the same, for plots [ms]"),
+    ),
     links=each(
         "links the estimate went out by",
         link=text("URI"),
         latency_ns=integer("from frame available to its last message handed to the kernel [ns]"),
+        latency_ms=number("the same, for plots [ms]"),
     ),
 )
 SIGHTINGS = json_topic(

@@ -8,10 +8,12 @@ import cv2
 import numpy as np
 import pytest
 
+from bridge.heard import Heard
 from bridge.log.film import MEGABYTE, WAITING_FRAMES, Film, FilmTerms, FrameFormat, Mark, MarkKind
 from bridge.log.footage import LogSource
 from bridge.log.reader import LogReader
-from tests.bridge.recordings import cameras, record, recorder, turns
+from bridge.wire import Received
+from tests.bridge.recordings import LINK, cameras, record, recorder, turns
 from tracker.errors import OperatorError
 from tracker.sources.image import decode_image
 from tracker.types import Event, Frame, Image, Reason, Rejected, Silence, Step, TrackState
@@ -38,6 +40,7 @@ def film_of(path: Path, events: list[Event], terms: FilmTerms, **options: bool) 
         for k, event in enumerate(events):
             log.take(event, SEARCHING, (), 2_000 + k)
         log.take(None, SEARCHING, (), 9_000)
+        log.take(None, SEARCHING, (), 9_500)
     return list(LogSource(path, lambda: 7))
 
 
@@ -75,7 +78,21 @@ def test_a_replay_knows_when_the_flight_took_each_event(tmp_path: Path) -> None:
     film_of(tmp_path / "a.mcap", [*flight(2), Silence(1_400)], PNG)
     source = LogSource(tmp_path / "a.mcap", lambda: 0)
     assert [source.now_ns for _ in source] == [2_000, 2_001, 2_002]
-    assert source.now_ns == 9_000, "the end has its time too"
+    assert source.now_ns == 9_000, "the end has its time too, and the closing of the links is none"
+
+
+def test_what_came_in_comes_in_again_before_the_turn_that_took_it_at_its_own_time(tmp_path: Path) -> None:
+    with recorder(tmp_path / "a.mcap", film=PNG) as log:
+        for k, frame in enumerate(flight(3)):
+            came = Received("HEARTBEAT", 1, 1, k, {}, bytes([k]), 1_900 + k)
+            log.take(frame, SEARCHING, (), 2_000 + k, Heard(((LINK, came), ("tcp:another:1", came))))
+    source = LogSource(tmp_path / "a.mcap", lambda: 0)
+    told: list[tuple[int, bytes | int]] = []
+    source.deliver_to({f"memory:{LINK}": lambda data: told.append((source.now_ns, data))})
+    for event in source:
+        assert isinstance(event, Frame)
+        told.append((source.now_ns, event.t_ns))
+    assert told == [turn for k in range(3) for turn in ((1_900 + k, bytes([k])), (2_000 + k, 1_000 + k))]
 
 
 @pytest.mark.parametrize(

@@ -203,10 +203,11 @@ def test_a_flood_costs_the_log_its_oldest_and_that_is_told() -> None:
     assert any("40 messages that came in are not in the log" in str(line) for line in told)
 
 
-def test_counts_alone_are_told_once_a_second_and_at_the_end() -> None:
+def test_counts_alone_are_told_once_a_second_and_everything_at_the_end() -> None:
     talk = Talk()
     told = [turn[-1].links for turn in talk.turns(150)]
     assert 3 <= sum(bool(links) for links in told) <= 1 + 150 * (PERIOD_NS + MS) // COUNTS_NS
     talk.now_ns += LOOK_NS // 2
     talk.outlet.say([Message("HEARTBEAT", 0, 0, make_message("HEARTBEAT", 0).fields)])
-    assert talk.hearer.take(talk.outlet, talk.now_ns, last=True).links
+    ends = [talk.hearer.take(talk.outlet, talk.now_ns, last=True) for _ in range(2)]
+    assert all(end.links and end.far_ends for end in ends), "viewers draw a state up to its last record"

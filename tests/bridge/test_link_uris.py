@@ -125,6 +125,7 @@ def test_udpin_sends_nothing_until_it_has_heard_somebody_then_to_the_first_heard
         ("udpout:127.0.0.1:14550", None),
         ("tcp:127.0.0.1:5760", None),
         ("memory:a", None),
+        ("memory:serial:/dev/ttyUSB0:57600", 5760.0),
         ("serial:/dev/ttyUSB0:fast", None),
     ],
 )

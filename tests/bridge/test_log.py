@@ -107,8 +107,11 @@ def test_what_was_sent_is_there_raw_and_decoded_with_its_latency(whole: Path) ->
     assert base64.b64decode(value["raw"]) == b"\xfd\x01\x02"
     assert value["fields"] == {"usec": START_NS // 1000, "x": 0.5, "covariance": [None, 0.25]}
     latency = first_json(whole, "/latency")
-    assert latency["stages"] == [{"name": "detect", "duration_ns": 400_000}, {"name": "ekf", "duration_ns": 90_000}]
-    assert latency["links"] == [{"link": LINK, "latency_ns": 5_000_000}]
+    assert latency["stages"] == [
+        {"name": "detect", "duration_ns": 400_000, "duration_ms": 0.4},
+        {"name": "ekf", "duration_ns": 90_000, "duration_ms": 0.09},
+    ]
+    assert latency["links"] == [{"link": LINK, "latency_ns": 5_000_000, "latency_ms": 5.0}]
 
 
 def test_the_clocks_are_noted_once_a_second(whole: Path) -> None:

@@ -12,7 +12,7 @@ from bridge.log.reader import LogReader
 from bridge.settings import Settings, load_settings
 from tests.system.recordings import short_copy
 from tests.tools.test_session import Time
-from tools.replay import on_paper, settings_of
+from tools.replay import grounded, settings_of
 from tools.request import Pace, RunRequest
 from tools.session import run_session
 from tracker.errors import OperatorError
@@ -51,15 +51,17 @@ def sent(log: Path) -> list[tuple[str, int, bytes]]:
 @pytest.mark.parametrize("pace", list(Pace))
 def test_a_replay_with_the_same_settings_sends_the_same_bytes(recording: Path, tmp_path: Path, pace: Pace) -> None:
     flown = fly(f"recording:{recording}", tmp_path / "a.mcap", settings(), pace)
-    again = fly(f"log:{flown}", tmp_path / "b.mcap", on_paper(settings_of(flown).with_frames("off", None)))
+    again = fly(
+        f"log:{flown}", tmp_path / "b.mcap", grounded(settings_of(flown).with_frames("off", None), answered=False)
+    )
     assert sent(again) == sent(flown)
     assert len(sent(flown)) > 2 * 2 * (PAIRS - 1)
 
 
 def test_a_replay_of_a_replay_needs_frames_in_it_again(recording: Path, tmp_path: Path) -> None:
     flown = fly(f"recording:{recording}", tmp_path / "a.mcap", settings())
-    again = fly(f"log:{flown}", tmp_path / "b.mcap", on_paper(settings_of(flown)))
-    third = fly(f"log:{again}", tmp_path / "c.mcap", on_paper(settings_of(again)))
+    again = fly(f"log:{flown}", tmp_path / "b.mcap", grounded(settings_of(flown), answered=False))
+    third = fly(f"log:{again}", tmp_path / "c.mcap", grounded(settings_of(again), answered=False))
     assert sent(third) == sent(flown)
 
 
@@ -68,7 +70,7 @@ def test_other_settings_give_other_poses_of_the_same_instants(recording: Path, t
     changed = settings_of(flown).model_copy(
         update={"tracker": settings().tracker.model_copy(update={"method": "paper"})}
     )
-    again = fly(f"log:{flown}", tmp_path / "b.mcap", on_paper(changed))
+    again = fly(f"log:{flown}", tmp_path / "b.mcap", grounded(changed, answered=False))
     poses = [{t_ns: raw for topic, t_ns, raw in sent(log) if "VISION_POSITION" in topic} for log in (flown, again)]
     shared = poses[0].keys() & poses[1].keys()
     assert len(shared) > PAIRS // 2
@@ -82,7 +84,7 @@ def test_a_replay_sends_an_autopilots_own_messages_though_none_is_there(
     flown = fly(f"recording:{recording}", tmp_path / "a.mcap", settings())
     lab = settings_of(flown)
     named = lab.model_copy(update={"mavlink": lab.mavlink.model_copy(update={"profile": profile})})
-    again = fly(f"log:{flown}", tmp_path / "b.mcap", on_paper(named))
+    again = fly(f"log:{flown}", tmp_path / "b.mcap", grounded(named, answered=False))
     message = {"ardupilot": "VISION_SPEED_ESTIMATE", "px4": "ODOMETRY"}[profile]
     assert sum(topic.endswith(message) for topic, _, _ in sent(again)) >= 2 * (PAIRS - 2)
 
@@ -92,7 +94,7 @@ def test_a_replay_of_a_cut_log_flies_what_is_there(recording: Path, tmp_path: Pa
     before = sent(flown)
     data = flown.read_bytes()
     flown.write_bytes(data[: len(data) * 2 // 3])
-    again = sent(fly(f"log:{flown}", tmp_path / "b.mcap", on_paper(settings_of(flown))))
+    again = sent(fly(f"log:{flown}", tmp_path / "b.mcap", grounded(settings_of(flown), answered=False)))
     agreeing = list(itertools.takewhile(lambda pair: pair[0] == pair[1], zip(before, again, strict=False)))
     assert len(again) - len(agreeing) <= 4, "only what the tracker still held back when the frames ended may differ"
     assert len(agreeing) > 5
@@ -108,6 +110,8 @@ def test_a_config_of_another_version_asks_for_one(recording: Path, tmp_path: Pat
 def test_a_replay_reaches_no_autopilot_and_needs_no_key() -> None:
     lab = load_settings("lab")
     signed = lab.model_copy(update={"mavlink": lab.mavlink.model_copy(update={"signing_key": "gone.key"})})
-    quiet = on_paper(signed)
-    assert [link.uri for link in quiet.links] == ["memory:udpout/127.0.0.1/14550"]
+    quiet = grounded(signed, answered=False)
+    assert [link.uri for link in quiet.links] == ["memory:udpout:127.0.0.1:14550"]
     assert quiet.mavlink.signing_key == ""
+    assert quiet.origin is None
+    assert grounded(quiet, answered=False) == quiet

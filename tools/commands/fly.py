@@ -64,6 +64,9 @@ def demo(
     seed: Annotated[int, typer.Option(help="Same seed, same flight, same noise.", metavar="N")] = 1,
     out: Annotated[Path, typer.Option(help="Folder for the log and the summary.", metavar="DIR")] = Path("logs/demo"),
     pace: Annotated[Pace, typer.Option(help="real: watch it fly. fast: as fast as it goes.")] = Pace.REAL,
+    log_frames: Annotated[
+        FrameFormat | None, typer.Option(help="Keep the frames in the log: png loses nothing, jpeg is small.")
+    ] = None,
     excite: Annotated[
         Path | None, typer.Option(help="Fly this plan of `excite` in place of the mission.", metavar="PLAN.toml")
     ] = None,
@@ -72,7 +75,7 @@ def demo(
 
     Exit code 0 only if it held its path; else 1.
     """
-    request = DemoRequest(duration_s, seed, out, pace)
+    request = DemoRequest(duration_s, seed, out, pace, log_frames)
 
     tell_of_compiling()
     if excite is not None:

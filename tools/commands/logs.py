@@ -82,11 +82,14 @@ def replay(
     """Run the frames of a log through the tracker again; with its own settings it sends the same bytes."""
     tell_of_compiling()
     from bridge.settings import load_settings
-    from tools.replay import on_paper, settings_of
+    from tools.replay import grounded, met_autopilot, settings_of
     from tools.session import run_session
 
     settings = (settings_of(log) if config is None else load_settings(config)).with_frames("off", None)
-    settings = settings.with_links(tuple(link)) if link else on_paper(settings)
+    if link:
+        settings = settings.with_links(tuple(link))
+    else:
+        settings = grounded(settings, answered=pace is Pace.FAST and met_autopilot(log))
     run_session(RunRequest(settings, f"log:{log}", out, pace, summary, overwrite, quiet), clocks_of(context))
 
 
