@@ -2,8 +2,8 @@
 
 A clock offset shows as speed times offset. In a hover the speed is mostly noise, and a filter that regresses on its own
 noise learns offsets that are not there, surer with every round: noise on the regressor biases a slope, and the noise of
-speed and that of place are the same pixels'. So a round whose speed is noise teaches nothing, and one whose speed is
-known to a share teaches an offset to that share of what it may be wrong by, however many rounds say the same.
+speed and that of place are the same pixels'. So a round of which a share of the speed may be noise adds that share of
+what an offset may be wrong by to the offset's variance, and one whose speed is all noise teaches nothing.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from tracker.maths.compiled import compiled
 from tracker.state import OFFSETS
 from tracker.types import Array
 
-MOST_NOISE = 1.0 / 25.0  # of the pixels' squared speed: a speed below five sigma may be noise alone
+CONTRADICTION = 5.0  # sigma: an offset that the cameras contradict so clearly is wrong, however vague the speed
+HALF = 0.5  # of such a step is how sure it is
 MOTION = 6  # components of velocity and rate; their errors follow as many of place and attitude
 
 
@@ -57,18 +58,20 @@ def taught(mean: Array, P_prior: Array, dt: float, H: Array, dx: Array, P: Array
         distribution is replaced (Friedland, "Treatment of bias in recursive filtering", IEEE Trans. Automatic Control
         14 (1969), separates them the same way). With noise of share s in the regressor, an offset o is found as
         o (1 - s) (Fuller, "Measurement Error Models", 1.1.1), and noise that speed and place share, at most as if the
-        place were late by dt, moves it by s dt: one sigma is not less than s (|o| + its sigma + dt).
+        place were late by dt, moves it by s dt. So each round adds one sigma of s (|o| + its sigma + dt).
     """
-    share = _noise_share(H, mean, dx, given_clocks(P))
-    dx, P = dx.copy(), P.copy()
+    known, dx, P = given_clocks(P), dx.copy(), P.copy()
+    share = _noise_share(H, mean, dx, known)
     for c in range(OFFSETS, len(P)):
-        before, after = P_prior[c, c], P[c, c]
+        before, after, step_s = P_prior[c, c], P[c, c], dx[c]
         if not before > after > 0.0:
             continue
-        reach_s = abs(mean[len(mean) - len(P) + c]) + math.sqrt(before) + dt
-        least = (share * reach_s) ** 2 if share < MOST_NOISE else math.inf
-        back = min(before, max(after, least)) - after
+        offset_s = mean[len(mean) - len(P) + c]
+        astray = (share * (abs(offset_s) + math.sqrt(before) + dt)) ** 2
+        if step_s**2 > CONTRADICTION**2 * after * (1.0 - after / before):
+            astray = min(astray, (HALF * step_s) ** 2)
+        back = min(before - after, astray)
         along = P[:, c] / after
-        dx -= along * (dx[c] * back / (before - after))
+        dx -= along * (step_s * back / (before - after))
         P += back * np.outer(along, along)
     return dx, P
