@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tracker.filter.clocks import given_clocks
 from tracker.filter.correction import innovation_covariance, path_noise
 from tracker.filter.manoeuvre import variances
 from tracker.filter.measure import Indices, camera_table, marker_points, pixels
@@ -94,8 +95,8 @@ def _distances2(y: Array, A: Array, B: Array, tops: Array) -> Array:
     return found
 
 
-@compiled("f8[:, ::1](f8[:, ::1], f8[:, ::1], i8[::1])")
-def _doubt(P: Array, H: Array, cameras: Indices) -> Array:
+@compiled("f8[:, ::1](f8[:, ::1], f8[:, ::1], f8[:, ::1], i8[::1])")
+def _doubt(P: Array, known: Array, H: Array, cameras: Indices) -> Array:
     """Return the covariance (2n, 2n) [px^2] of unknown speed times unknown clock offset.
 
     Source: a pixel goes by J (v + dv) (o + do). dv do is of second order, and no slope at v = 0, o = 0 shows it; its
@@ -111,8 +112,8 @@ def _doubt(P: Array, H: Array, cameras: Indices) -> Array:
             if cameras[j // 2] == camera:
                 for k in range(3):
                     for m in range(3):
-                        speed = H[i, k] * P[6 + k, 6 + m] * H[j, m]
-                        doubt[i, j] += variance * (speed + H[i, 3 + k] * P[9 + k, 9 + m] * H[j, 3 + m])
+                        speed = H[i, k] * known[6 + k, 6 + m] * H[j, m]
+                        doubt[i, j] += variance * (speed + H[i, 3 + k] * known[9 + k, 9 + m] * H[j, 3 + m])
     return doubt
 
 
@@ -138,5 +139,5 @@ def _covariances(
         path[k] = path_noise(H, cameras, lags_s, T, 3 * k)
         unit = process_noise(size, dt, T, 1.0 - k, float(k))
         B[k] = innovation_covariance(H, unit, path[k])
-    doubt = _doubt(P, H, cameras)
+    doubt = _doubt(P, given_clocks(P), H, cameras)
     return R, innovation_covariance(H, P, R + doubt), B, path, doubt

@@ -18,6 +18,7 @@ import numpy as np
 from filterpy.kalman import update as kalman_update
 
 from tracker.filter.batch import Batch, make_batch
+from tracker.filter.clocks import taught
 from tracker.filter.fit import Fit, fit
 from tracker.filter.posterior import settled
 from tracker.filter.predict import Prediction, at_origin
@@ -81,7 +82,7 @@ def update(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig, pro
     for sighting, gain in zip(batch.sightings, whole.gains() if best is not whole else (), strict=False):
         if sighting not in best.batch.sightings:
             rejected.append(_left_out(sighting, rig, float(gain), "from what the others say"))
-    state = at_origin(_posterior(ahead.state, best), ahead.pivot_inB)
+    state = at_origin(_posterior(ahead, best), ahead.pivot_inB)
     return Update(state, best.nis, len(best.u), best.batch.sightings, tuple(rejected))
 
 
@@ -127,8 +128,10 @@ def _left_out(sighting: BallSighting, rig: Rig, distance2: float, where: str) ->
     return Rejected(Reason.GATE, f"{name}: {np.sqrt(distance2):.1f} sigma {where}", sighting.t_ns, sighting.camera)
 
 
-def _posterior(prior: State, best: Fit) -> State:
+def _posterior(ahead: Prediction, best: Fit) -> State:
     """Take the likeliest state, and the covariance of one linear step there from the prior, by filterpy."""
+    prior = ahead.state
     _, P_after = kalman_update(np.zeros((len(best.P), 1)), best.P, best.y[:, None], best.R, best.H)
-    mean, P, noise = settled(prior.mean, best.dx, P_after, prior.noise, best.batch.cameras, best.u, best.inverse)
+    dx, P_after = taught(prior.mean, best.P, ahead.dt, best.H, best.dx, P_after)
+    mean, P, noise = settled(prior.mean, dx, P_after, prior.noise, best.batch.cameras, best.u, best.inverse)
     return prior.at_mean(prior.t_ns, mean, P, best.levels, noise)

@@ -9,6 +9,7 @@ import numpy as np
 
 from tracker.filter import manoeuvre
 from tracker.filter.batch import Batch
+from tracker.filter.bend import bend_noise
 from tracker.filter.correction import TILT_ROWS, likeliest, log_likelihoods, weighed
 from tracker.filter.manoeuvre import expected, judged
 from tracker.filter.measure import camera_table, marker_points
@@ -16,7 +17,7 @@ from tracker.filter.predict import Prediction
 from tracker.filter.singer import process_noise
 from tracker.maths.compiled import compiled
 from tracker.rig import Rig
-from tracker.state import ATTITUDE, POSITION
+from tracker.state import ATTITUDE
 from tracker.types import Array
 
 LEAST_OPEN_TURN_RAD = 0.01
@@ -129,9 +130,9 @@ def _fitted(ahead: Prediction, batch: Batch, rig: Rig, levels: Array, P: Array, 
     if not math.isfinite(dx @ dx):
         return None
     if max(variances[ATTITUDE].tolist()) > LEAST_OPEN_TURN_RAD**2 / 3.0:
-        bend_px = _bend(ahead, batch, rig, dx, P, H, R)
-        if bend_px is not None:
-            R[:n, :n] += np.outer(bend_px, bend_px)
+        bend = _bend(ahead, batch, rig, dx, P, H, R)
+        if bend is not None:
+            R[:n, :n] += bend
             dx, y, H, variances = _solve(ahead, batch, rig, P, R)
             if not math.isfinite(dx @ dx):
                 return None
@@ -147,26 +148,15 @@ def _solve(ahead: Prediction, batch: Batch, rig: Rig, P: Array, R: Array) -> tup
 
 
 def _bend(ahead: Prediction, batch: Batch, rig: Rig, dx: Array, P: Array, H: Array, R: Array) -> Array | None:
-    """Return how far a turn that a fit left open bends the balls' paths from straight (2n,) [px], or None if little.
+    """Return the covariance (2n, 2n) [px^2] of what a pose left open does beyond first order, None if little.
 
-    Linearised, a ball off that turn's axis moves square to its arm; truly it moves on a circle, which a filter that
-    believes its tangent takes for knowledge of the arm's direction. Arms are from the pivot, so a turn about two balls
-    bends nothing; what one camera alone leaves open does.
-
-    Source: turned by phi about the unit axis e, the arm m goes to second order by phi^2/2 (e (e.m) - m). For phi
-        normal with variance s, E[phi^4] = 3 s^2, so the rms of that is sqrt(3)/2 s |...|, the mean counted in. s, e:
-        the largest eigenvalue of the attitude's covariance and its vector.
+    Arms are from the pivot, so a turn about two balls bends nothing; what one camera alone leaves open does.
     """
     HP = H @ P
-    posterior = P[ATTITUDE, ATTITUDE] - HP[:, ATTITUDE].T @ np.linalg.solve(HP @ H.T + R, HP[:, ATTITUDE])
-    variances, axes = np.linalg.eigh(posterior)
-    largest, axis = float(variances[2]), axes[:, 2]
-    if largest < LEAST_OPEN_TURN_RAD**2:
-        return None
-    arms = marker_points(rig) - ahead.pivot_inB
-    R_BtoW = ahead.state.moved(dx).R_BtoW
-    sag_inW = (arms @ np.outer(axis, axis) - arms) * (largest * np.sqrt(3.0) / 2.0) @ R_BtoW.T
-    n = len(batch.z)
-    J = H[:n, POSITION].reshape(-1, 2, 3)
-    bend_px = np.asarray((J @ sag_inW[batch.balls][:, :, None]).reshape(-1))
-    return bend_px if bool((np.abs(bend_px) > BEND_SHARE * np.sqrt(np.diag(R)[:n])).any()) else None
+    after = P - HP.T @ np.linalg.solve(HP @ H.T + R, HP)
+    noise = bend_noise(
+        ahead.state.mean, dx, after, ahead.process.manoeuvre_s, batch.cameras, batch.balls, batch.lags_s,
+        camera_table(rig), marker_points(rig) - ahead.pivot_inB,
+    )  # fmt: skip
+    little = np.diag(noise) < BEND_SHARE**2 * np.diag(R)[: len(noise)]
+    return None if bool(little.all()) else np.asarray(noise)

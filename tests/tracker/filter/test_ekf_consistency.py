@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
 
 from tests.tracker.rigs import PROCESS, difference, perturbed, ring_rig, state
 from tracker.filter.ekf import Update, update
@@ -133,6 +134,24 @@ def test_an_unknown_clock_offset_is_found_to_half_a_millisecond() -> None:
         last = flown(PATHS["figure8"], seed, 30.0, offset_s=offset_s)[-1].state
         assert abs(last.offsets_s[1] - offset_s) < 0.0005
         assert np.sqrt(last.P[18, 18]) < 0.0005
+
+
+@pytest.mark.parametrize("name", ["hover", "square", "figure8"])
+def test_an_unknown_clock_offset_errs_as_its_sigma_says(name: str) -> None:
+    """Mean squared error in sigmas over 20 flights, below the 95 % band's upper end; it may be surer than it says."""
+    squares = []
+    for seed in range(20):
+        offset_s = float(np.random.default_rng(500 + seed).normal(scale=PROCESS.clock_offset_s))
+        last = flown(PATHS[name], seed, 6.0, offset_s=offset_s)[-1].state
+        squares.append((last.offsets_s[1] - offset_s) ** 2 / last.P[18, 18])
+    assert np.mean(squares) < chi2.ppf(0.975, 20) / 20
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_vehicle_that_stands_still_teaches_no_clock_offset(seed: int) -> None:
+    last = flown(lambda _t_s: PATHS["hover"](0.0), seed, 8.0, offset_s=0.01)[-1].state
+    assert np.sqrt(last.P[18, 18]) > 0.99 * PROCESS.clock_offset_s
+    assert abs(last.offsets_s[1]) < 0.1 * PROCESS.clock_offset_s
 
 
 def test_in_a_hover_the_unknown_offset_costs_nothing() -> None:
