@@ -23,12 +23,14 @@ UV_PX = np.array([300.3, 240.4])
 def after(balls: int, since: int) -> Rivals:
     """Return rivals that know the light of so many balls, set up anew since when so many were learned."""
     known = replace(Appearance(), light=Light(count=balls))
-    return Rivals((known,) * 3, (0.0,) * 3, since)
+    return Rivals((known,) * 3, (0.0,) * 3, since, np.zeros(2))
 
 
 def judged(*misfits: float) -> Rivals:
     """Return what becomes of rivals that have differed so, with the ball that completes their round."""
-    rivals = Rivals(tuple(Appearance(Response(gamma=gamma)) for gamma in GAMMAS), misfits, ROUND_BALLS - 1)
+    rivals = Rivals(
+        tuple(Appearance(Response(gamma=gamma)) for gamma in GAMMAS), misfits, ROUND_BALLS - 1, np.array([0.3, 0.4])
+    )
     canvas = empty_canvas(CAMERA)
     draw_ball(canvas, UV_PX, 4.0, BALL)
     ball = Expected((UV_PX[0], UV_PX[1]), 4.0, (0.0, 0.0), FLAT, Response())
@@ -55,6 +57,15 @@ def test_the_gamma_is_where_the_misfits_parabola_is_lowest(gamma: float) -> None
     found = judged(*(3.0 * (each - gamma) ** 2 for each in GAMMAS))
     assert found.settled
     assert gammas(found) == [pytest.approx(gamma, abs=0.06)]
+
+
+def test_rivals_that_hardly_differ_are_not_judged_yet() -> None:
+    assert gammas(judged(0.1, 0.0, 0.1)) == list(GAMMAS)
+
+
+def test_the_better_the_gamma_is_known_the_less_it_may_move_the_centres() -> None:
+    searching, told, linear = judged(0.1, 0.0, 0.1), judged(1.0, 0.0, 1.0), judged(0.0, 1.5, 2.0)
+    assert searching.doubt_px > told.doubt_px > linear.doubt_px > 0.0
 
 
 def test_a_gamma_that_may_be_higher_than_all_rivals_is_looked_for_up_there() -> None:
