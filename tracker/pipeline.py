@@ -278,7 +278,8 @@ class Tracker:
         )
 
     def _shared(self, state: State) -> Array:
-        return shared_covariance(state, self._rig, self._eyes.exposure_s, self._moved_px)
+        doubts_px = np.hypot(self._eyes.doubts_px, self._moved_px)
+        return shared_covariance(state, self._rig, self._eyes.exposure_s, doubts_px)
 
 
 def _late(frame: Frame) -> Rejected:

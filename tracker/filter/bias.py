@@ -18,23 +18,23 @@ from tracker.rig import Rig
 from tracker.state import State
 from tracker.types import Array
 
-LIGHT_PX = 0.02  # one sigma that light learned from balls leaves, in simulated rooms of other lamps and gammas
+LIGHT_PX = 0.015  # one sigma that light learned from balls leaves, in simulated rooms of other lamps
 STREAK_SHARE = 0.01  # of the streak: what it leaves
 
 
-def shared_covariance(state: State, rig: Rig, exposure_s: float, moved_px: Array) -> Array:
+def shared_covariance(state: State, rig: Rig, exposure_s: float, doubts_px: Array) -> Array:
     """Return the covariance (3, 3) of the position by errors that all balls of a camera share [m^2].
 
-    moved_px: (cameras,) one sigma of what is left of a knock [px].
+    doubts_px: (cameras,) one sigma of what a camera's gamma, not quite known, and a knock leave [px].
     Source: a shift of all images by noise of one sigma s in each camera is a measurement of the position with slope
         f / d (I - u u'), u the ray, d the distance; so the covariance is (sum (f / d s)^2 (I - u u'))^-1. s grows with
-        the streak f / d |(I - u u') v| exposure, and with what a knock of the camera has left.
+        the streak f / d |(I - u u') v| exposure, and with the doubts.
     """
-    return _shared(state.mean, camera_table(rig), exposure_s, moved_px)
+    return _shared(state.mean, camera_table(rig), exposure_s, doubts_px)
 
 
 @compiled("f8[:, ::1](f8[::1], f8[:, ::1], f8, f8[::1])")
-def _shared(mean: Array, table: Array, exposure_s: float, moved_px: Array) -> Array:
+def _shared(mean: Array, table: Array, exposure_s: float, doubts_px: Array) -> Array:
     """Return what `shared_covariance` does, of a `State.mean` and a `camera_table`."""
     information, u = np.zeros((3, 3)), np.empty(3)
     for c in range(len(table)):
@@ -49,7 +49,7 @@ def _shared(mean: Array, table: Array, exposure_s: float, moved_px: Array) -> Ar
             along += mean[12 + i] * u[i]
         scale = (table[c, 0] + table[c, 1]) / 2.0 / distance_m
         streak_px = scale * math.sqrt(max(speed2 - along * along, 0.0)) * exposure_s
-        weight = scale**2 / (LIGHT_PX**2 + (STREAK_SHARE * streak_px) ** 2 + moved_px[c] ** 2)
+        weight = scale**2 / (LIGHT_PX**2 + (STREAK_SHARE * streak_px) ** 2 + doubts_px[c] ** 2)
         for i in range(3):
             information[i, i] += weight
             for j in range(3):

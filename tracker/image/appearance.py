@@ -16,7 +16,8 @@ from tracker.image.template import FLAT, Shades
 from tracker.types import Array, Image
 
 BEARING_STEP_RAD = 0.07  # rays closer than this share a ball's shading
-PUBLISH_AT = (3, 6, 9, 12, 15, 18, 36, 72, 144)  # balls learned when templates follow the light, then every last
+PUBLISH_AT = (3, 6, 9, 12, 15, 18, 27)  # balls learned when templates follow the light; then, as long as
+PUBLISH_SOON, MANY, PUBLISH_LATE = 9, 144, 36  # they are not many, every so many, and later every so many
 BLUR_STEP_PX, FIRST_STEP_PX = 0.03, 0.15
 DETAIL_SHARE = 0.05  # of the newest ball in what is known of the camera's colour detail
 MISFIT_MAX = 2.0  # an image that fits no ball teaches nothing
@@ -70,9 +71,14 @@ class Appearance:
         R_RtoW = ray_frame(*_ray(ball, camera), camera.R_CtoW)
         equations = light_on(sample, self.light.lamp_seen(R_RtoW))
         light = self.light if equations is None else self.light.learned(*equations, R_RtoW)
-        due = light.count in PUBLISH_AT or light.count % PUBLISH_AT[-1] == 0
-        shown = light if due and light.trusted else self.shown
+        shown = light if _due(light.count) and light.trusted else self.shown
         return Appearance(response, light, shown)
+
+
+def _due(balls: int) -> bool:
+    """Say whether templates should follow the light now."""
+    every = PUBLISH_SOON if balls <= MANY else PUBLISH_LATE
+    return balls in PUBLISH_AT or (balls > PUBLISH_AT[-1] and balls % every == 0)
 
 
 def _ray(ball: Expected, camera: Camera) -> tuple[float, float]:

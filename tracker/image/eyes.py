@@ -17,7 +17,7 @@ from tracker.state import State
 from tracker.types import Frame
 
 LIGHT_BALLS = 2  # a single ball that is something else would tell of a light that is not there
-LEARN_ALL = 72  # balls of each camera; then
+LEARN_ALL = 36  # balls of each camera under its gamma; then
 LEARN_EVERY = 4  # rounds one ball
 BLIND_PX = 0.5  # of the streak's sigma: how fast the balls move is not known
 SMEAR_DOUBT = 0.1  # of an unknown smear: what it moves the centre of a shaded ball, one sigma
@@ -25,7 +25,10 @@ LONG_STREAK_PX = 0.7  # an image smeared further than this, taken for a still on
 
 
 class Eyes:
-    """What each camera of a rig knows of how balls look to it."""
+    """What each camera of a rig knows of how balls look to it.
+
+    doubts_px: by camera, by how much all centres may be wrong together for what is not known, one sigma [px].
+    """
 
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
@@ -40,8 +43,9 @@ class Eyes:
         """Take note of what is known by now: asked for in every round, it changes with lessons alone."""
         self._appearances = [rivals.best for rivals in self._rivals]
         self._exposures_s = tuple([appearance.response.exposure_s for appearance in self._appearances])
+        self.doubts_px = tuple([rivals.doubt_px for rivals in self._rivals])
         self._gamma_known = all(rivals.settled for rivals in self._rivals)
-        enough = all(appearance.light.count >= LEARN_ALL for appearance in self._appearances)
+        enough = all(rivals.count >= LEARN_ALL for rivals in self._rivals)
         self._settled = self._gamma_known and enough  # how balls look is known, so that little is left to learn
 
     def stand(self, rig: Rig) -> None:

@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.image.centre import Group, misfit_at, numbers_of, slopes_at
+from tracker.image.centre import Group, misfit_at, numbers_of, slopes_at, templates_of
 from tracker.image.patch import LUMA, TRUST, Expected, Patch, Response, X, Y
-from tracker.image.reading import LUMA_VAR, read
+from tracker.image.reading import CHROMA_VAR, LUMA_VAR, read
+from tracker.image.robust import without_strangers
 from tracker.image.template import COARSE, GLOSS, TERMS, Vector, draw, every_term, steps_of
 from tracker.maths.compiled import compiled
 from tracker.maths.solve import cholesky, dot, eliminate, solve
@@ -29,6 +30,7 @@ PLANE, OTHERS = 3, 6  # of the background; with the centre's two, and the gloss,
 class Sample:
     """One ball's pixels, with what was known of it and where its fit put it.
 
+    patch: trusts those less that fit no ball.
     centre: from the patch's middle pixel [px].
     slopes (2, n): of its brightness, as fitted, by the centre [1/px].
     sharper_luma, sharper_chroma: whether its brightness and its colour would fit better with less blur.
@@ -43,7 +45,11 @@ class Sample:
 
 
 def sample_of(patch: Patch, ball: Expected, centre: tuple[float, float]) -> Sample:
-    """Look at a fitted ball again."""
+    """Look at a fitted ball again, and past what is in front of it or beside it."""
+    numbers, (luma, chroma) = numbers_of(ball), templates_of(ball)
+    bright = without_strangers(patch.bright, luma.fine, luma.made, numbers, LUMA_VAR, *centre)
+    colour = without_strangers(patch.colour, chroma.fine, chroma.made, numbers, CHROMA_VAR, *centre)
+    patch = Patch(bright, colour)
     slopes, by_luma = slopes_at(patch, ball, centre, Group.BRIGHTNESS)
     _, by_chroma = slopes_at(patch, ball, centre, Group.COLOUR)
     return Sample(patch, ball, centre, slopes, by_luma > 0.0, by_chroma > 0.0)

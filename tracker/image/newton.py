@@ -15,6 +15,7 @@ from tracker.types import Array
 PLANE = 3  # terms of the background
 TUKEY = 4.685  # of the robust sigma: 95 % efficient where all is well (Huber, Ronchetti, "Robust Statistics", 2009)
 LEAST_WEIGHT = 1e-3
+LEAST_MISFIT = 0.3
 ITERATIONS = 5
 LATTICE = 8  # places per pixel where a ball is linearised
 FARTHEST_PX = 1.5  # a centre further from the middle pixel has run away
@@ -177,7 +178,7 @@ def _misfit(squares: Array, tukey: Array, channels: int, shapes: int, normal: Ar
         freedom += channels * tukey[i] ** 2
         total += squares[i] * tukey[i] ** 2
     misfit = total / max(1.0, freedom)
-    normal /= max(1.0, misfit)
+    normal /= max(LEAST_MISFIT, misfit)
     return misfit
 
 
@@ -243,8 +244,8 @@ def gauss_newton(
             _doubt(squares_b, 1, tukey_b)
             _doubt(squares_c, 2, tukey_c)
     fit[0], fit[1] = u, v
-    add_octants(bright, work_b[p + PLANE + 1 :], at_u, at_v, 1.0 / max(1.0, misfit_b), octants)
-    add_octants(colour, work_c[p + PLANE + 1 :], at_u, at_v, 1.0 / max(1.0, misfit_c), octants)
+    add_octants(bright, work_b[p + PLANE + 1 :], at_u, at_v, 1.0 / max(LEAST_MISFIT, misfit_b), octants)
+    add_octants(colour, work_c[p + PLANE + 1 :], at_u, at_v, 1.0 / max(LEAST_MISFIT, misfit_c), octants)
     doubted_covariance(normal, disagreement(normal_b, normal_c), octants, u - at_u, v - at_v, fit[2:5])
     fit[5] = (misfit_b * n_bright + misfit_c * 2 * n_colour) / (n_bright + 2 * n_colour)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -18,6 +20,7 @@ CAMERA = RIG.cameras[0]
 BALL = RIG.marker.balls[1]
 RADIUS_PX = 2.8  # the paper's ball in the middle of the room
 SHARP = Response(0.2, 0.2, detail=1.0)
+Noise = tuple[float, np.random.Generator] | None
 TUBE_BGR, SKIN_BGR = np.array([38.0, 36.0, 35.0]), np.array([118.0, 142.0, 198.0])
 
 
@@ -25,9 +28,10 @@ def expected(uv_px: Array, radius_px: float = RADIUS_PX) -> Expected:
     return Expected((float(uv_px[0]), float(uv_px[1])), radius_px, (0.0, 0.0), FLAT, SHARP)
 
 
-def picture(
-    uv_px: Array, radius_px: float = RADIUS_PX, noise: tuple[float, np.random.Generator] | None = None
-) -> Image:
+Paint = Callable[[Array, float, Noise], Image]
+
+
+def picture(uv_px: Array, radius_px: float = RADIUS_PX, noise: Noise = None) -> Image:
     canvas = empty_canvas(RIG.cameras[0])
     draw_ball(canvas, uv_px, radius_px, BALL)
     return developed(canvas, noise)
@@ -39,13 +43,13 @@ def fitted(image: Image, guess_px: Array, radius_px: float = RADIUS_PX) -> Centr
     return found
 
 
-def accustomed(radius_px: float) -> Appearance:
+def accustomed(radius_px: float, paint: Paint = picture) -> Appearance:
     """Return what a camera has learned from forty balls."""
     rng = np.random.default_rng(2)
     known = Appearance(SHARP)
     for _ in range(40):
         uv_px = rng.uniform((200, 200), (400, 300))
-        image = picture(uv_px, radius_px, noise=(1.0, rng))
+        image = paint(uv_px, radius_px, (1.0, rng))
         what = known.expected_like(expected(uv_px, radius_px), CAMERA, uv_px)
         found = fit_centre(image, what)
         assert isinstance(found, Centre)
@@ -66,6 +70,25 @@ def test_a_ball_is_found_to_a_thirtieth_of_a_pixel_once_the_light_is_known(radiu
         assert isinstance(found, Centre)
         errors.append(found.uv_px - uv_px)
     assert np.sqrt(np.mean(np.square(errors), axis=0)).max() < 1.0 / 30.0
+
+
+def on_a_stand(uv_px: Array, radius_px: float, noise: Noise) -> Image:
+    """Take a picture of a ball that rests on a dark bar."""
+    canvas = empty_canvas(CAMERA)
+    draw_ball(canvas, uv_px, radius_px, BALL)
+    draw_band(canvas, uv_px, 0.0, -radius_px, 0.5, TUBE_BGR)
+    return developed(canvas, noise)
+
+
+def test_a_bar_under_every_ball_is_not_taken_for_shade() -> None:
+    rng, known = np.random.default_rng(3), accustomed(4.0, on_a_stand)
+    errors = []
+    for _ in range(20):
+        uv_px = rng.uniform((200, 200), (400, 300))
+        found = fit_centre(picture(uv_px, 4.0, (1.0, rng)), known.expected_like(expected(uv_px, 4.0), CAMERA, uv_px))
+        assert isinstance(found, Centre)
+        errors.append(found.uv_px - uv_px)
+    assert np.abs(np.mean(errors, axis=0)).max() < 0.02
 
 
 @pytest.mark.parametrize("radius_px", [2.2, 2.8, 4.0, 6.5])

@@ -1,0 +1,51 @@
+"""Which pixels of a ball's image show the ball and the room behind it, and which something else.
+
+Every ball is held by a tube, and beside it is the airframe: always on the same side as the camera sees it. A fit of the
+centre can bear that, but what is learned from many balls would take the tube for shade.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tracker.image.newton import LEAST_WEIGHT, PLANE, TUKEY, draw_at, fit_linear, residual, rows_of
+from tracker.image.patch import LUMA, TRUST
+from tracker.maths.compiled import compiled
+from tracker.types import Array
+
+ROUNDS = 3
+MEDIANS = 0.455, 1.386
+"""Of a chi-square of one degree of freedom, and of two."""
+
+
+@compiled("f8[:, ::1](f8[:, ::1], Array(float32, 3, 'C', True), f8[::1], f8[::1], i8, f8, f8)")
+def without_strangers(
+    pixels: Array, fine: NDArray[np.float32], made: Array, ball: Array, variance: int, u: float, v: float
+) -> Array:
+    """Return a copy of pixels (..., n) that trusts those less which fit no ball with its centre at (u, v).
+
+    The spread of what the fit leaves is its own, however noisy the camera: half of the pixels lie within its median.
+    Source: Tukey's biweight, Huber, Ronchetti, "Robust Statistics", 2009.
+    """
+    n, p, channels = pixels.shape[1], fine.shape[2], len(pixels) - LUMA
+    m = p + PLANE
+    drawn, weighted, weight = np.empty((rows_of(p), n)), np.empty((m, n)), pixels[TRUST] ** 2
+    factor, coefficients = np.empty((m, m)), np.empty((channels, m))
+    rest, squares, believed = np.empty(n), np.empty(n), np.ones(n)
+    draw_at(pixels, fine, made, ball, variance, u, v, drawn)
+    for _ in range(ROUNDS):
+        fit_linear(pixels, drawn[:m], weight, weighted, factor, coefficients)
+        squares[:] = 0.0
+        for channel in range(channels):
+            residual(drawn[:m], coefficients[channel], pixels[LUMA + channel], rest)
+            for i in range(n):
+                squares[i] += (pixels[TRUST, i] * rest[i]) ** 2
+        spread = np.median(squares) / MEDIANS[channels - 1]
+        for i in range(n):
+            believed[i] = max(LEAST_WEIGHT, 1.0 - squares[i] / (channels * TUKEY**2 * max(spread, LEAST_WEIGHT)))
+            weight[i] = (believed[i] * pixels[TRUST, i]) ** 2
+    trusted = pixels.copy()
+    for i in range(n):
+        trusted[TRUST, i] *= believed[i]
+    return trusted
