@@ -12,12 +12,14 @@ state goes in, a new state comes out.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations
 
 import numpy as np
-from filterpy.kalman import update as kalman_update
+from filterpy.kalman import KalmanFilter
 
 from tracker.filter.batch import Batch, make_batch
+from tracker.filter.correction import inverse_of
 from tracker.filter.fit import Fit, fit
 from tracker.filter.posterior import settled
 from tracker.filter.predict import Prediction, at_origin
@@ -129,6 +131,19 @@ def _left_out(sighting: BallSighting, rig: Rig, distance2: float, where: str) ->
 
 def _posterior(prior: State, best: Fit) -> State:
     """Take the likeliest state, and the covariance of one linear step there from the prior, by filterpy."""
-    _, P_after = kalman_update(np.zeros((len(best.P), 1)), best.P, best.y[:, None], best.R, best.H)
-    mean, P, noise = settled(prior.mean, best.dx, P_after, prior.noise, best.batch.cameras, best.u, best.inverse)
+    step = _linear_step(len(best.P))
+    step.x, step.P = np.zeros((len(best.P), 1)), best.P
+    step.update(best.y[:, None], best.R, best.H)
+    mean, P, noise = settled(prior.mean, best.dx, step.P, prior.noise, best.batch.cameras, best.u, best.inverse)
     return prior.at_mean(prior.t_ns, mean, P, best.levels, noise)
+
+
+@lru_cache(maxsize=8)
+def _linear_step(size: int) -> KalmanFilter:
+    """Return filterpy's filter for states of a size: every update brings it the prior, and nothing is kept in it.
+
+    It is given a compiled inverse: LAPACK's takes longer to call than a matrix of so few sightings takes to invert.
+    """
+    step = KalmanFilter(dim_x=size, dim_z=1)  # a measurement brings its own size
+    step.inv = inverse_of
+    return step
