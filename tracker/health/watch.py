@@ -41,7 +41,8 @@ class CalibrationWatch:
     def __init__(self, rig: Rig, sigma_px: float) -> None:
         self._rig = rig
         self._sigma_px = sigma_px
-        self._backgrounds = [Background(camera) for camera in rig.cameras]
+        cameras = rig.cameras
+        self._backgrounds = [Background(camera, ahead=k / len(cameras)) for k, camera in enumerate(cameras)]
         self._agreement = Agreement(len(rig.cameras))
         self._odds = NOBODY
         self._newest: dict[int, list[BallSighting]] = {}
