@@ -99,11 +99,18 @@ class State:
 
         Only to be read: it is the vector that `at_mean` was given, if the state's parts are still parts of that.
         """
-        whole, parts = self.p_BinW.base, (
-            self.p_BinW, self.R_BtoW, self.v_BinW, self.w_BinB, self.a_BinW, self.alpha_BinB, self.offsets_s
-        )  # fmt: skip
-        if whole is not None and all(part.base is whole for part in parts):
+        whole = self.p_BinW.base
+        if (
+            whole is not None
+            and self.R_BtoW.base is whole
+            and self.v_BinW.base is whole
+            and self.w_BinB.base is whole
+            and self.a_BinW.base is whole
+            and self.alpha_BinB.base is whole
+            and self.offsets_s.base is whole
+        ):
             return whole
+        parts = self.p_BinW, self.R_BtoW, self.v_BinW, self.w_BinB, self.a_BinW, self.alpha_BinB, self.offsets_s
         return np.concatenate([part.reshape(-1) for part in parts])
 
     def with_mean(self, mean: Array) -> State:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Iterable
 from typing import ParamSpec, TypeVar
 
@@ -27,22 +28,23 @@ class Stages:
 
     def __init__(self, stopwatch: Nanoseconds) -> None:
         self._stopwatch = stopwatch
-        self._running: dict[str, int] = {}
+        self._running: defaultdict[str, int] = defaultdict(int)
 
     def time(self, stage: str, call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
         """Call and add the time it took to the stage's."""
-        started_ns = self._stopwatch()
+        stopwatch, running = self._stopwatch, self._running
+        started_ns = stopwatch()
         result = call(*args, **kwargs)
-        self.add(stage, self._stopwatch() - started_ns)
+        running[stage] += stopwatch() - started_ns
         return result
 
     def add(self, stage: str, took_ns: int) -> None:
         """Add a time that was taken elsewhere."""
-        self._running[stage] = self._running.get(stage, 0) + took_ns
+        self._running[stage] += took_ns
 
     def end_pair(self) -> dict[str, int]:
         """Return what each stage came to since the last pair [ns]."""
-        ended, self._running = self._running, {}
+        ended, self._running = self._running, defaultdict(int)
         return ended
 
 

@@ -117,23 +117,29 @@ def log_likelihoods(y: Array, A: Array, B: Array, variances: Array, means: tuple
         B: (2, n, n) by a variance of 1 of translation and of rotation.
         variances: (2, levels) tried of one, while the other has its mean.  means: (2,).
     """
-    n = len(y)
-    found, L, white = np.empty(variances.shape), np.empty((n, n)), np.empty(n)
-    for k in range(2):
-        for level in range(variances.shape[1]):
-            total, s, r = 0.0, variances[k, level], means[1 - k]
-            for i in range(n):
-                for j in range(i + 1):
-                    L[i, j] = A[i, j] + s * B[k, i, j] + r * B[1 - k, i, j]
-                white[i] = y[i]
-            for i in range(n):
-                for j in range(i):
-                    L[i, j] = (L[i, j] - dot(L[i, :j], L[j, :j])) / L[j, j]
-                L[i, i] = math.sqrt(L[i, i] - dot(L[i, :i], L[i, :i]))
-                white[i] = (white[i] - dot(L[i, :i], white[:i])) / L[i, i]
-                total -= 0.5 * white[i] ** 2 + math.log(L[i, i])
-            found[k, level] = total
-    return found
+    n, levels = len(y), variances.shape[1]
+    tries = 2 * levels  # of every level of one, then of the other; all go through Cholesky's factors side by side
+    s, r = np.full(tries, means[0]), np.full(tries, means[1])
+    s[:levels], r[levels:] = variances[0], variances[1]
+    found, L, white = np.zeros(tries), np.empty((n, n, tries)), np.empty((n, tries))
+    for i in range(n):
+        white[i] = y[i]
+        for j in range(i + 1):
+            a, by_s, by_r = A[i, j], B[0, i, j], B[1, i, j]
+            for t in range(tries):
+                L[i, j, t] = a + s[t] * by_s + r[t] * by_r
+            for k in range(j):
+                for t in range(tries):
+                    L[i, j, t] -= L[i, k, t] * L[j, k, t]
+            if j < i:
+                for t in range(tries):
+                    L[i, j, t] /= L[j, j, t]
+                    white[i, t] -= L[i, j, t] * white[j, t]
+        for t in range(tries):
+            L[i, i, t] = math.sqrt(L[i, i, t])
+            white[i, t] /= L[i, i, t]
+            found[t] -= 0.5 * white[i, t] ** 2 + math.log(L[i, i, t])
+    return found.reshape(2, levels)
 
 
 @compiled("f8[::1](f8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")
@@ -199,13 +205,14 @@ def _tilt(mean: Array, H: Array, y: Array) -> None:
 def _linear(P: Array, H: Array, R: Array, y: Array, dx: Array, variances: Array) -> tuple[Array, float]:
     """Return P H' S^-1 y (size,) and its largest step from dx in posterior sigmas; write the posterior variances."""
     m, n = H.shape
-    HP = np.zeros((m, n + 1))
+    HP, S = np.zeros((m, n + 1)), R.copy()
     for i in range(m):
         for k in range(n):
             for j in range(n):
                 HP[i, j] += H[i, k] * P[k, j]
+        for j in range(i + 1):  # of S no more than the lower half is asked for
+            S[i, j] += dot(HP[i, :n], H[j])
         HP[i, n] = y[i]
-    S = innovation_covariance(H, P, R)
     white = forward(factor(S), HP)
     new, biggest = np.zeros(n), 0.0
     for j in range(n):

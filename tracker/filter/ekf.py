@@ -12,13 +12,16 @@ state goes in, a new state comes out.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from itertools import combinations
+from threading import get_ident
 
 import numpy as np
-from filterpy.kalman import update as kalman_update
+from filterpy.kalman import KalmanFilter
 
 from tracker.filter.batch import Batch, make_batch
 from tracker.filter.clocks import taught
+from tracker.filter.correction import inverse_of
 from tracker.filter.fit import Fit, fit
 from tracker.filter.posterior import settled
 from tracker.filter.predict import Prediction, at_origin
@@ -130,8 +133,20 @@ def _left_out(sighting: BallSighting, rig: Rig, distance2: float, where: str) ->
 
 def _posterior(ahead: Prediction, best: Fit) -> State:
     """Take the likeliest state, and the covariance of one linear step there from the prior, by filterpy."""
-    prior = ahead.state
-    _, P_after = kalman_update(np.zeros((len(best.P), 1)), best.P, best.y[:, None], best.R, best.H)
-    dx, P_after = taught(prior.mean, best.P, ahead.dt, best.H, best.dx, P_after)
+    prior, step = ahead.state, _linear_step(len(best.P), get_ident())
+    step.x, step.P = np.zeros((len(best.P), 1)), best.P
+    step.update(best.y[:, None], best.R, best.H)
+    dx, P_after = taught(prior.mean, best.P, ahead.dt, best.H, best.dx, step.P)
     mean, P, noise = settled(prior.mean, dx, P_after, prior.noise, best.batch.cameras, best.u, best.inverse)
     return prior.at_mean(prior.t_ns, mean, P, best.levels, noise)
+
+
+@lru_cache(maxsize=8)
+def _linear_step(size: int, _thread: int) -> KalmanFilter:
+    """Return filterpy's filter for a thread's states of a size: every update brings it the prior, it keeps nothing.
+
+    It is given a compiled inverse: LAPACK's takes longer to call than a matrix of so few sightings takes to invert.
+    """
+    step = KalmanFilter(dim_x=size, dim_z=1)  # a measurement brings its own size
+    step.inv = inverse_of
+    return step

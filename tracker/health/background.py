@@ -39,9 +39,12 @@ class Background:
     """Watch the room through one camera, a patch now and then.
 
     camera: its picture's size.
+    ahead: of the time from patch to patch, by what share the first is behind its time: that of each camera of a rig
+        differs, so that they look in different rounds, and none is held up by all of them.
     """
 
-    def __init__(self, camera: Camera) -> None:
+    def __init__(self, camera: Camera, ahead: float = 0.0) -> None:
+        self._ahead = ahead
         width, height = camera.width_px - 1, camera.height_px - 1
         self._middle_px = np.array([width, height]) / 2.0
         self._corners_px = np.array([[0, 0], [width, 0], [0, height], [width, height]]) - self._middle_px
@@ -86,7 +89,7 @@ class Background:
         """
         if self._patches is None:
             self._patches = choose_patches(image, balls_px, off_px)
-            self._begin(t_ns)
+            self._begin(t_ns - round(self._ahead * PASS_NS / max(len(self._patches), 1)))
             if len(self._patches) < LEAST_PATCHES:
                 self.witness = Witness.BLIND
             return True

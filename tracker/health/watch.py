@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from tracker.health.agreement import Agreement, Odds
 from tracker.health.background import NEVER_NS, Background
 from tracker.health.mend import turned
 from tracker.health.rays import residuals
-from tracker.health.sample import take_sample
+from tracker.health.sample import Sample, take_sample
 from tracker.rig import Rig
 from tracker.standing import CameraHealth, Health, Witness
 from tracker.state import State
@@ -41,9 +41,11 @@ class CalibrationWatch:
     def __init__(self, rig: Rig, sigma_px: float) -> None:
         self._rig = rig
         self._sigma_px = sigma_px
-        self._backgrounds = [Background(camera) for camera in rig.cameras]
+        cameras = rig.cameras
+        self._backgrounds = [Background(camera, ahead=k / len(cameras)) for k, camera in enumerate(cameras)]
         self._agreement = Agreement(len(rig.cameras))
         self._odds = NOBODY
+        self._left: deque[Callable[[], None]] = deque()  # of the last sample's judgement, a part a round
         self._newest: dict[int, list[BallSighting]] = {}
         self._sampled_ns = self._due_ns = -NEVER_NS
         self._taken_ns = NEVER_NS
@@ -66,6 +68,9 @@ class CalibrationWatch:
         Returns:
             How the calibration stands, where the round told something new of it.
         """
+        if self._left:
+            self._left.popleft()()
+            return None if self._left else self.health(state, t_ns)
         if not refused and self._taken_ns <= t_ns < self._due_ns:
             return None
         self._taken_ns = t_ns
@@ -73,9 +78,10 @@ class CalibrationWatch:
             self._backgrounds[camera].hurry()
         looked = [self._look(frame, state) for frame in frames]
         self._remember(used, refused)
-        sampled = state is not None and self._sample(state, t_ns)
+        if state is not None:
+            self._sample(state, t_ns)
         self._due_ns = min(self._sampled_ns + SAMPLE_NS - TOGETHER_NS, *(each.due_ns for each in self._backgrounds))
-        return self.health(state, t_ns) if any(looked) or sampled else None
+        return self.health(state, t_ns) if any(looked) else None
 
     def health(self, state: State | None, t_ns: int) -> Health:
         """Return how the calibration stands."""
@@ -107,18 +113,18 @@ class CalibrationWatch:
         off_px = REACH * self._size_m * camera.focal_px / float(np.linalg.norm(state.p_BinW - camera.p_CinW))
         return background.look(frame.image, frame.t_ns, balls_px[np.isfinite(balls_px).all(axis=1)], off_px)
 
-    def _sample(self, state: State, t_ns: int) -> bool:
-        """Hold the newest sightings against each other, if it is time; say whether that was done."""
+    def _sample(self, state: State, t_ns: int) -> None:
+        """Hold the newest sightings against each other, if it is time; what that says is found in the next rounds."""
         if 0 <= t_ns - self._sampled_ns < SAMPLE_NS:
-            return False
+            return
         near = [one for seen in self._newest.values() for one in seen if abs(one.t_ns - t_ns) <= TOGETHER_NS]
         sample = take_sample(near, state, self._rig, self._sigma_px)
-        if sample is None:
-            return False
-        self._sampled_ns = t_ns
+        if sample is not None:
+            self._sampled_ns = t_ns
+            self._left += (lambda: self._weigh(sample)), (lambda: self._figures.append(residuals(near, self._rig)))
+
+    def _weigh(self, sample: Sample) -> None:
         self._odds = self._agreement.add(sample)
-        self._figures.append(residuals(near, self._rig))
-        return True
 
     def _camera(self, index: int, state: State | None) -> CameraHealth:
         background, camera = self._backgrounds[index], self._rig.cameras[index]

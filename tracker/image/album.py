@@ -14,7 +14,7 @@ from typing import NamedTuple
 from tracker.camera import Camera
 from tracker.image.appearance import BEARING_STEP_RAD, Appearance
 from tracker.image.light import Light
-from tracker.image.template import SMALL_PX, Template, draw, sampling_of, steps_of
+from tracker.image.template import RADIUS_STEP_PX, SMALL_PX, Template, draw, sampling_of, steps_of
 from tracker.image.view import RADIUS, RAY_X, RAY_Y
 
 KEPT = 256  # templates, of about 100 kB each: what a flight through a room shows
@@ -45,23 +45,25 @@ class Album:
         self._serving: dict[tuple[int, int], tuple[Wanted, Template]] = {}  # by ball and side of the box
         self._as_wanted: dict[int, tuple[tuple[object, ...], tuple[Template, Template]]] = {}  # by ball, no neighbours
         self._drawn: dict[Wanted, Template] = {}
+        self._take_up(Appearance())
 
     def serve(self, ball: int, view: Sequence[float], appearance: Appearance) -> tuple[Template, Template]:
         """Return the templates of a ball's brightness and of its colour.
 
         view: a row of `view.expected_views`.
         """
-        r, shown, radius_px = appearance.response, appearance.shown, view[RADIUS]
+        if appearance is not self._appearance:
+            self._take_up(appearance)
+        radius_px, (luma_steps, chroma_steps, box_px, shown) = view[RADIUS], self._looks
         x_steps = y_steps = 0
         if shown.count:
             x_steps, y_steps = round(view[RAY_X] / BEARING_STEP_RAD), round(view[RAY_Y] / BEARING_STEP_RAD)
-        radius_steps, luma_steps = steps_of(radius_px, r.luma_px)
-        _, chroma_steps = steps_of(radius_px, r.chroma_px)
-        steps = radius_steps, luma_steps, chroma_steps, x_steps, y_steps, r.block_px, radius_px < SMALL_PX, shown
+        radius_steps = round(radius_px / RADIUS_STEP_PX)
+        steps = radius_steps, x_steps, y_steps, radius_px < SMALL_PX, self._looks
         before = self._as_wanted.get(ball)
         if before is not None and before[0] == steps:
             return before[1]
-        box_px, bearing = r.block_px, (x_steps, y_steps)
+        bearing = x_steps, y_steps
         luma = Wanted(radius_steps, luma_steps, *bearing, 1, sampling_of(radius_px, 1), shown)
         chroma = Wanted(radius_steps, chroma_steps, *bearing, box_px, sampling_of(radius_px, box_px), shown)
         slots = (ball, 0), (ball, 1)
@@ -69,6 +71,13 @@ class Album:
         if self._serving[slots[0]][0] == luma and self._serving[slots[1]][0] == chroma:
             self._as_wanted[ball] = steps, pair
         return pair
+
+    def _take_up(self, appearance: Appearance) -> None:
+        """Note what of an appearance tells templates apart; it changes with lessons alone."""
+        r = appearance.response
+        _, luma_steps = steps_of(0.0, r.luma_px)
+        _, chroma_steps = steps_of(0.0, r.chroma_px)
+        self._appearance, self._looks = appearance, (luma_steps, chroma_steps, r.block_px, appearance.shown)
 
     def _template(
         self, slot: tuple[int, int], wanted: Wanted, view: Sequence[float], appearance: Appearance

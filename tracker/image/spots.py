@@ -105,7 +105,10 @@ def _shift_for(lowest_spread: NDArray[np.int16]) -> int:
 @compiled("void(Array(u1, 3, 'C', readonly=True), i8, i8, i8, i8, u1[:, ::1])")
 def _line(image: Image, row: int, left: int, blue_by: int, red_by: int, line: NDArray[np.uint8]) -> None:
     """Fill in the pixels of a row from `left` on, the colour of the light undone."""
-    line[:] = image[row, left : left + len(line)]
+    first = np.uint64((row * image.shape[1] + left) * 3)
+    pixels, copy = image.reshape(image.size), line.reshape(line.size)  # of two axes each byte would be taken by itself
+    for i in range(np.uint64(len(copy))):
+        copy[i] = pixels[first + i]
     if blue_by == UNITY and red_by == UNITY:
         return
     blue, red, most = np.uint16(blue_by), np.uint16(red_by), np.uint16(LEVELS - 1)

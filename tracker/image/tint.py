@@ -20,7 +20,7 @@ from tracker.types import Image
 
 CORE_SHARE = 0.6  # of the radius: further out the background shines in
 UNITY = 16  # of the fixed point that pixels are multiplied in: a colour's box is far wider than a sixteenth
-SLIGHT_LOG = 0.12  # a gain within this factor changes no ball's colour so far that its box would not hold it
+SLIGHT = math.exp(0.12)  # a gain within this factor changes no ball's colour so far that its box would not hold it
 LEARN_BALLS = 4  # of each colour, until its own colour is taken as known
 FOLLOW_SHARE = 0.5  # of a newly seen light
 MOST_LOG = 0.7  # a gain beyond exp(0.7), twice, is a mistake
@@ -47,7 +47,7 @@ class Gains:
 
 
 def _undoing(gain: float) -> int:
-    return UNITY if abs(math.log(gain)) < SLIGHT_LOG else round(UNITY / gain)
+    return UNITY if 1.0 / SLIGHT < gain < SLIGHT else round(UNITY / gain)
 
 
 NEUTRAL = Gains()

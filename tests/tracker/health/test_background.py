@@ -118,3 +118,14 @@ def test_a_shift_is_found_within_its_covariance_whatever_three_of_ten_do(seed: i
 def test_no_shift_is_found_where_no_majority_agrees() -> None:
     rng = np.random.default_rng(1)
     assert find_shift(rng.uniform(-300, 300, (10, 2)), rng.uniform(-5, 5, (10, 2)), np.full(10, 0.03)) is None
+
+
+def test_the_cameras_of_a_rig_take_turns_in_looking() -> None:
+    image = SceneRenderer(RIG, seed=3).render(0, NOWHERE, NO_TROUBLE)
+    backgrounds = [Background(CAMERA, ahead=share) for share in (0.0, 0.5)]
+    together = 0
+    for t_ns in range(FRAME_NS, 2 * PASS_NS, FRAME_NS):
+        together += all(background.due_ns <= t_ns for background in backgrounds)
+        for background in backgrounds:
+            background.look(image, t_ns)
+    assert together <= 2  # to choose the patches, and for the first of them
