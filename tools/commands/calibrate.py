@@ -152,6 +152,7 @@ def room(
 
 @calibrate.command()
 def refine(
+    context: typer.Context,
     log: Annotated[Path, typer.Argument(help="The log of a flight in which a camera was bumped.")],
     moved: Annotated[
         list[str] | None,
@@ -159,8 +160,13 @@ def refine(
             help="The camera that moved; else those that the flight named. May be given again.", metavar="CAM"
         ),
     ] = None,
+    config: Annotated[
+        str | None,
+        typer.Option(help="The config flown with, whose comments are kept; else the log's.", metavar="CONFIG"),
+    ] = None,
+    by: Annotated[str, typer.Option(help="Who mended, for the room file.", metavar="NAME")] = "",
     out: Annotated[
-        Path | None, typer.Option(help="Write the cameras here, as [[rig.cameras]].", metavar="ROOM.toml")
+        Path | None, typer.Option(help="Write the room file here: the config with these cameras.", metavar="ROOM.toml")
     ] = None,
     overwrite: OverwriteOption = False,
     json: JsonOption = False,
@@ -172,5 +178,6 @@ def refine(
     from tools.calibrate.grade import Grade
     from tools.calibrate.refine.session import RefineRequest, run_refine
 
-    if run_refine(RefineRequest(log, tuple(moved or ()), out, overwrite, json)).grade is Grade.NOT_GOOD:
+    request = RefineRequest(log, tuple(moved or ()), config, by, out, overwrite, json)
+    if run_refine(request, clocks_of(context)).grade is Grade.NOT_GOOD:
         raise typer.Exit(EXIT_CALIBRATION_NOT_GOOD)

@@ -13,12 +13,13 @@ from rich.console import Console
 
 from bridge.settings import Settings, load_settings
 from tools.calibrate.formats.convert import read_cameras
-from tools.calibrate.room.file import Record, write_room
+from tools.calibrate.room.file import Record, read_config, write_room
 from tools.calibrate.room.footage import Footage, watch
 from tools.calibrate.room.inspect import inspect
 from tools.calibrate.room.report import to_json, to_text
 from tools.calibrate.room.room import Terms, calibrate_room
 from tools.calibrate.room.verdict import Verdict, judge
+from tools.calibrate.room.worth import worth_of
 from tools.colours.write import check_target
 from tools.open_source import open_source
 from tools.request import Clocks
@@ -94,7 +95,8 @@ def run_room(request: RoomRequest, clocks: Clocks) -> Verdict:
     verdict = judge(room)
     if request.out is not None:
         day = str(datetime.fromtimestamp(clocks.wall() / 1e9, UTC).date())
-        write_room(request.out, request.config, room, verdict, Record(day, request.by, request.source, request.frame))
+        record = Record(day, request.by, request.source, request.frame)
+        write_room(request.out, read_config(request.config), room.cameras, worth_of(room, verdict), record)
     sys.stdout.write((to_json(room, verdict) if request.as_json else to_text(room, verdict)) + "\n")
     return verdict
 

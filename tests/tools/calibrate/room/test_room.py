@@ -22,6 +22,7 @@ from tools.calibrate.room.room import Room, Terms, calibrate_room
 from tools.calibrate.room.spots import Stand, floor_of
 from tools.calibrate.room.tracks import Track
 from tools.calibrate.room.verdict import judge
+from tools.calibrate.room.worth import worth_of
 from tools.cli import run_command_line
 from tracker.errors import OperatorError
 from tracker.maths import so3
@@ -32,6 +33,7 @@ from tracker.types import Array, frozen_array
 
 TERMS = Terms(True, SPOTS_inW[0], APART_M, np.array([1.2, 0.8, 0.8]), lenses=False)
 LAB = (Path(__file__).parents[4] / "config" / "lab.toml").read_text(encoding="utf-8")
+ADA = Record("2026-01-31", "Ada", "camera:0,1", "spots")
 CAMERAS_inW = np.array([[1.6, 1.6, 2.2], [-1.6, -1.6, 2.2]])
 
 
@@ -98,7 +100,7 @@ def test_refined_lenses_come_nearer_to_the_true_ones(footage: tuple[Rig, Footage
 
 def test_the_room_file_is_the_config_with_measured_cameras_and_runs(room: Room, tmp_path: Path) -> None:
     path = tmp_path / "room.toml"
-    text = with_room(LAB, room, judge(room), Record("2026-01-31", "Ada", "camera:0,1", "spots"))
+    text = with_room(LAB, room.cameras, worth_of(room, judge(room)), ADA)
     path.write_text(text, encoding="utf-8")
     settings = load_settings(path)
     chosen = rig_of(settings, paper_rig().cameras)
@@ -110,7 +112,7 @@ def test_the_room_file_is_the_config_with_measured_cameras_and_runs(room: Room, 
     assert (settings.rig.measured.by, settings.rig.measured.verdict) == ("Ada", "good")
     assert "# Fix exposure, white balance and focus" in text
     assert "Nominal cameras" not in text
-    assert with_room(text, room, judge(room), Record("2026-01-31", "Ada", "camera:0,1", "spots")) == text
+    assert with_room(text, room.cameras, worth_of(room, judge(room)), ADA) == text
 
 
 def stands(places: list[tuple[float, float, float]], up: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> list[Stand]:
