@@ -68,6 +68,10 @@ def to_json(room: Room, verdict: Verdict) -> str:
             {"balls": list(s.names), "config_mm": s.said_mm, "found_mm": s.found_mm, "sigma_mm": s.sigma_mm}
             for s in room.sides
         ],
+        "radii": [
+            {"balls": list(s.names), "config_mm": s.said_mm, "found_mm": s.found_mm, "sigma_mm": s.sigma_mm}
+            for s in room.sizes
+        ],
         "scale": None if off_mm is None else {"off_mm": off_mm, "tolerance_mm": scale_tolerance_mm(room)},
     }  # fmt: skip
     return orjson.dumps(figures, option=orjson.OPT_INDENT_2).decode()
@@ -116,6 +120,11 @@ def _marker(room: Room) -> Iterator[str]:
         for side in room.sides
     )
     yield f"marker: {sides} mm, their mean taken from the config"
+    sizes = ", ".join(
+        f"{' '.join(size.names)} {size.found_mm:.2f} +- {size.sigma_mm:.2f} (config {size.said_mm:.2f})"
+        for size in room.sizes
+    )
+    yield f"ball radius: {sizes} mm"
 
 
 def _frame(room: Room) -> Iterator[str]:

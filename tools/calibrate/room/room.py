@@ -11,13 +11,14 @@ from tools.calibrate.room.footage import Footage
 from tools.calibrate.room.gauge import moved
 from tools.calibrate.room.held_out import HeldOut, judged
 from tools.calibrate.room.jacobian import CAMERA
-from tools.calibrate.room.sides import Side, measured_sides
+from tools.calibrate.room.radius import Size, measured_sizes
+from tools.calibrate.room.sides import Side, measured_sides, refuse_swapped
 from tools.calibrate.room.solve import Found, find_cameras
 from tools.calibrate.room.spots import Floor, find_stands, floor_of
 from tools.calibrate.room.volume import Volume, surveyed
 from tracker.camera import Camera
 from tracker.errors import OperatorError
-from tracker.rig import Rig
+from tracker.rig import Rig, make_rig
 from tracker.types import Array
 
 
@@ -51,6 +52,7 @@ class Room:
     held_out: HeldOut
     volume: Volume
     sides: tuple[Side, ...]
+    sizes: tuple[Size, ...]
     floor: Floor | None
     apart_m: float | None
     seen_s: tuple[float, ...]
@@ -81,9 +83,11 @@ def calibrate_room(footage: Footage, rig: Rig, terms: Terms) -> Room:
     """Find the cameras, put them into the room's frame, and measure how good they are.
 
     Raises:
-        OperatorError: footage that tells nothing, or no spots where they are wanted.
+        OperatorError: footage that tells nothing, balls in each other's places, or no spots where they are wanted.
     """
     found = find_cameras(footage, rig, lenses=terms.lenses)
+    sides = measured_sides(found, rig)
+    refuse_swapped(sides, rig)
     floor = None
     R, p = np.eye(3), np.zeros(3)
     if terms.by_spots:
@@ -105,7 +109,8 @@ def calibrate_room(footage: Footage, rig: Rig, terms: Terms) -> Room:
         found,
         judged(found, rig),
         surveyed(cameras, covariance, scene.p_BinW, terms.volume_m),
-        measured_sides(found, rig),
+        sides,
+        measured_sizes(footage, make_rig(found.cameras, rig.marker)),
         floor,
         terms.apart_m,
         _seen_s(found),

@@ -12,8 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from tools.calibrate.grade import Grade
+from tools.calibrate.room.radius import Size, together
 from tools.calibrate.room.room import Room
-from tools.calibrate.room.sides import Side
+from tools.calibrate.room.sides import SIDE_MM, SURE, Side
 
 GOOD_POINT_MM, USABLE_POINT_MM = 5.0, 15.0  # one sigma, worst cell
 GOOD_SPACING_MM, USABLE_SPACING_MM = 2.0, 5.0  # 95 % of the held out
@@ -22,8 +23,6 @@ GOOD_CLOCK_MS, USABLE_CLOCK_MS = 0.5, 3.0  # one sigma: at 1 m/s a millisecond i
 GOOD_VISITED, USABLE_VISITED = 0.3, 0.1  # of the cells that two cameras see
 GOOD_SEEN_S, USABLE_SEEN_S = 10.0, 4.0
 WILD_SHARE = 0.2
-SURE = 3.0  # sigmas from which a difference is no chance
-SIDE_MM = 0.5  # what a ruler errs by
 TAPE_MM = 2.0  # what a tape errs by, one sigma
 FAR_MM, FAR_DEG = 500.0, 20.0
 
@@ -71,6 +70,7 @@ def _graded(room: Room) -> Iterator[tuple[Grade, str]]:
     yield from _of_footage(room)
     for side in room.sides:
         yield from _of_side(side)
+    yield from _of_sizes(room.sizes)
     off_mm = scale_off_mm(room)
     if room.floor is not None and off_mm is None:
         yield Grade.USABLE, "scale unchecked: it rests on the marker's sides alone; measure the spots, --apart_mm"
@@ -154,6 +154,23 @@ def _of_side(side: Side) -> Iterator[tuple[Grade, str]]:
             f"marker: {' to '.join(side.names)} is {side.found_mm:.1f} +- {side.sigma_mm:.1f} mm, the config's "
             f"[[marker.balls]] say {side.said_mm:.1f} mm: measure it, correct position_mm, and run this again",
         )
+
+
+def _of_sizes(sizes: tuple[Size, ...]) -> Iterator[tuple[Grade, str]]:
+    """Doubt the radius of all balls, or else of single ones: it moves no centre, but such balls are found less well."""
+    every = together(sizes)
+    alike = all(abs(size.off_mm - every.off_mm) <= SURE * size.sigma_mm for size in sizes)
+    for size in (every,) if alike else sizes:
+        if _is_off(size):
+            yield (
+                Grade.USABLE,
+                f"ball radius: {', '.join(size.names)} measured {size.found_mm:.2f} +- {size.sigma_mm:.2f} mm, config "
+                f"says {size.said_mm:.2f} mm: measure across with a caliper, correct radius_mm in [[marker.balls]]",
+            )
+
+
+def _is_off(size: Size) -> bool:
+    return abs(size.off_mm) > SURE * size.sigma_mm
 
 
 def _notes(room: Room) -> Iterator[str]:

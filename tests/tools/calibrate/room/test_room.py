@@ -17,8 +17,10 @@ from tools.calibrate.room.bundle import zoomed
 from tools.calibrate.room.file import Record, with_room
 from tools.calibrate.room.footage import Footage
 from tools.calibrate.room.inspect import inspect
+from tools.calibrate.room.radius import measured_sizes
 from tools.calibrate.room.report import to_json, to_text
 from tools.calibrate.room.room import Room, Terms, calibrate_room
+from tools.calibrate.room.sides import Side, refuse_swapped
 from tools.calibrate.room.spots import Stand, floor_of
 from tools.calibrate.room.tracks import Track
 from tools.calibrate.room.verdict import judge
@@ -88,6 +90,32 @@ def test_a_marker_built_otherwise_than_the_config_says_is_named_with_its_length(
     verdict = judge(calibrate_room(seen, with_places(rig, places), TERMS))
     assert verdict.grade is Grade.NOT_GOOD
     assert any(reason.startswith("marker: yellow to green is 16") for reason in verdict.against)
+
+
+def test_balls_that_are_swapped_are_named_where_the_sides_tell(footage: tuple[Rig, Footage]) -> None:
+    rig, _ = footage
+    told = [Side(("a", "b"), 0.0, side_mm, 0.1) for side_mm in (140.0, 166.5, 157.9)]
+    places = np.array([[0.06, -0.046, 0.0], [0.0, 0.1, 0.0], [-0.08, -0.046, 0.0]])
+    with pytest.raises(OperatorError, match="yellow is where it has orange, green is where it has yellow, orange is"):
+        refuse_swapped(tuple(told), with_places(rig, places))
+    refuse_swapped(tuple(told), with_places(rig, places[[2, 0, 1]]))
+
+
+@pytest.mark.parametrize("share", [0.95, 1.05])
+def test_a_ball_radius_of_the_config_that_is_wrong_is_told(footage: tuple[Rig, Footage], share: float) -> None:
+    rig, seen = footage
+    balls = tuple(replace(ball, radius_m=share * ball.radius_m) for ball in rig.marker.balls)
+    sizes = measured_sizes(seen, make_rig(paper_rig().cameras, make_marker(balls)))
+    for size, truth in zip(sizes, rig.marker.balls, strict=True):
+        assert abs(size.found_mm - 1e3 * truth.radius_m) < 3.0 * size.sigma_mm
+        assert size.sigma_mm < 0.01 * size.found_mm
+
+
+def test_a_wrong_radius_is_told_once_for_all_balls_and_a_single_one_by_its_name(room: Room) -> None:
+    wrong = [replace(size, said_mm=1.05 * size.found_mm) for size in room.sizes]
+    for sizes, names in ((wrong, "yellow, green, orange"), ([room.sizes[0], wrong[1], room.sizes[2]], "green")):
+        (doubt,) = judge(replace(room, sizes=tuple(sizes))).doubts
+        assert doubt.startswith(f"ball radius: {names} measured 7.")
 
 
 def test_refined_lenses_come_nearer_to_the_true_ones(footage: tuple[Rig, Footage]) -> None:
