@@ -6,12 +6,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from tools.calibrate.board import Board
 from tools.calibrate.room.certainty import camera_covariance, turned
 from tools.calibrate.room.footage import Footage
 from tools.calibrate.room.gauge import moved
 from tools.calibrate.room.held_out import HeldOut, judged
 from tools.calibrate.room.jacobian import CAMERA
+from tools.calibrate.room.lying import Lying, lying_board
 from tools.calibrate.room.radius import Size, measured_sizes
+from tools.calibrate.room.scene import Scene
 from tools.calibrate.room.sides import Side, measured_sides, refuse_swapped
 from tools.calibrate.room.solve import Found, find_cameras
 from tools.calibrate.room.spots import Floor, find_stands, floor_of
@@ -26,10 +29,10 @@ from tracker.types import Array
 class Terms:
     """What the operator says of the room.
 
-    by_spots: gravity and heading come from three spots, else from the config's cameras.
-    origin_m (3,): where in the room the marker's middle is on the first spot.
+    by_spots: gravity and heading come from three spots; else from the board, or, without one, the config's cameras.
+    origin_m (3,): where in the room the marker's middle is on the first spot, or the board's first inner corner.
     apart_m: measured distance of the first two spots, None if nobody did.  volume_m (3,): the config's.
-    lenses: refine them.
+    lenses: refine them.  board: that lies on the floor, None for none.
     """
 
     by_spots: bool
@@ -37,12 +40,14 @@ class Terms:
     apart_m: float | None
     volume_m: Array
     lenses: bool
+    board: Board | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Room:
     """cameras: in the room's frame, with their clocks.  covariance (7 n, 7 n): see `certainty.camera_covariance`.
 
+    lying: the board on the floor, where it gives the frame.
     seen_s: how long each camera saw the marker together with another [s].
     """
 
@@ -56,6 +61,7 @@ class Room:
     floor: Floor | None
     apart_m: float | None
     seen_s: tuple[float, ...]
+    lying: Lying | None = None
 
     def position_mm(self, c: int) -> Array:
         """Return one sigma of a camera's position (3,) in the room, against the other cameras [mm]."""
@@ -83,20 +89,16 @@ def calibrate_room(footage: Footage, rig: Rig, terms: Terms) -> Room:
     """Find the cameras, put them into the room's frame, and measure how good they are.
 
     Raises:
-        OperatorError: footage that tells nothing, balls in each other's places, or no spots where they are wanted.
+        OperatorError: footage that tells nothing, balls in each other's places, no spots or no board where wanted.
     """
     found = find_cameras(footage, rig, lenses=terms.lenses)
     sides = measured_sides(found, rig)
     refuse_swapped(sides, rig)
-    floor = None
-    R, p = np.eye(3), np.zeros(3)
-    if terms.by_spots:
-        hung = np.array([camera.p_CinW for camera in found.cameras])
-        floor = floor_of(find_stands(found, rig), hung, terms.origin_m)
-        R, p = floor.R_WtoF, floor.p_WinF
-    else:
-        _refuse_upside_down(found)
-    scene = moved(found.scene, R, p)
+    floor, lying = _frame_of(footage, found, rig, terms)
+    frame = floor or lying
+    scene = found.scene if frame is None else moved(found.scene, frame.R_WtoF, frame.p_WinF)
+    if floor is None:
+        _refuse_upside_down(scene)
     cameras = tuple(
         replace(camera, clock_offset_ns=timed.clock_offset_ns)
         for camera, timed in zip(scene.cameras, found.cameras, strict=True)
@@ -114,11 +116,22 @@ def calibrate_room(footage: Footage, rig: Rig, terms: Terms) -> Room:
         floor,
         terms.apart_m,
         _seen_s(found),
+        lying,
     )
 
 
-def _refuse_upside_down(found: Found) -> None:
-    up = float(found.scene.R_BtoW[:, 2, 2].mean())
+def _frame_of(footage: Footage, found: Found, rig: Rig, terms: Terms) -> tuple[Floor | None, Lying | None]:
+    """Return the spots' frame or the board's; neither where the config's cameras give it."""
+    if terms.by_spots:
+        hung = np.array([camera.p_CinW for camera in found.cameras])
+        return floor_of(find_stands(found, rig), hung, terms.origin_m), None
+    if terms.board is not None:
+        return None, lying_board(footage.stills, found.cameras, terms.board, terms.origin_m)
+    return None, None
+
+
+def _refuse_upside_down(scene: Scene) -> None:
+    up = float(scene.R_BtoW[:, 2, 2].mean())
     if up < 0.0:
         raise OperatorError(
             "calibrate room: MIRRORED: by the order of its colours the marker was carried upside down most of the "

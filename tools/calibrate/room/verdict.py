@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from tools.calibrate.grade import Grade
+from tools.calibrate.room.lying import Lying
 from tools.calibrate.room.radius import Size, together
 from tools.calibrate.room.room import Room
 from tools.calibrate.room.sides import SIDE_MM, SURE, Side
@@ -71,6 +72,7 @@ def _graded(room: Room) -> Iterator[tuple[Grade, str]]:
     for side in room.sides:
         yield from _of_side(side)
     yield from _of_sizes(room.sizes)
+    yield from _of_board(room.lying)
     off_mm = scale_off_mm(room)
     if room.floor is not None and off_mm is None:
         yield Grade.USABLE, "scale unchecked: it rests on the marker's sides alone; measure the spots, --apart_mm"
@@ -81,6 +83,26 @@ def _graded(room: Room) -> Iterator[tuple[Grade, str]]:
             f"scale: the first two spots came out {abs(off_mm):.1f} mm too {'far apart' if off_mm > 0 else 'close'}, "
             f"at most {scale_tolerance_mm(room):.1f} mm: the marker's sides in the config are {abs(percent):.1f} % too "
             f"{'long' if off_mm > 0 else 'short'}, or --apart_mm is wrong",
+        )
+
+
+def _of_board(lying: Lying | None) -> Iterator[tuple[Grade, str]]:
+    if lying is None:
+        return
+    yield (
+        _grade(lying.rms_px, GOOD_PX, USABLE_PX),
+        f"the board's corners miss by {lying.rms_px:.2f} px, good is {GOOD_PX:g} px: it moved, is not flat, or "
+        "--corners are not its own",
+    )
+    if lying.larger is None:
+        yield Grade.USABLE, "scale unchecked: one camera alone saw the board; lay it where two see it"
+    elif abs(lying.larger) > SURE * lying.larger_sigma:
+        large, long = ("large", "long") if lying.larger > 0.0 else ("small", "short")
+        yield (
+            Grade.NOT_GOOD,
+            f"scale: the board came out {abs(100 * lying.larger):.2f} % too {large}, at most "
+            f"{100 * SURE * lying.larger_sigma:.2f} %: the marker's sides in the config are as much too {long}, or "
+            "--square_mm is wrong: measure both",
         )
 
 
@@ -174,8 +196,10 @@ def _is_off(size: Size) -> bool:
 
 
 def _notes(room: Room) -> Iterator[str]:
-    if room.floor is None:
-        yield "tilt, heading and origin are those of the config's cameras; --frame spots measures them"
+    if room.lying is not None:
+        yield "the floor under the board is taken for level"
+    elif room.floor is None:
+        yield "tilt, heading and origin are those of the config's cameras; --frame spots or board measures them"
     else:
         yield (
             f"the three spots are taken for level; on them the marker leans {room.floor.lean_deg:.1f} deg, which a "

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from bridge.settings import RigOrigin, load_settings, rig_of
+from tests.tools.calibrate.room.test_lying import FLOOR, CORNER_inW, stills
 from tests.tools.calibrate.room.waved import watched
 from tests.tracker.paper_rig import paper_rig
 from tools.calibrate.grade import Grade
@@ -64,6 +65,23 @@ def test_three_spots_put_the_cameras_where_they_are_in_the_room_and_the_verdict_
     assert (verdict.grade, verdict.against) == (Grade.GOOD, ())
     assert to_text(room, verdict).splitlines()[-1].startswith("Good: points are known to ")
     assert json.loads(to_json(room, verdict))["grade"] == "good"
+
+
+def test_a_board_on_the_floor_stands_in_for_the_spots(footage: tuple[Rig, Footage]) -> None:
+    rig, seen = footage
+    cameras = paper_rig().cameras
+    lain = replace(seen, stills=tuple(stills(cameras, (0, 1))))
+    room = calibrate_room(lain, rig, replace(TERMS, by_spots=False, board=FLOOR, origin_m=CORNER_inW, apart_m=None))
+    for camera, truth in zip(room.cameras, cameras, strict=True):
+        assert np.linalg.norm(camera.p_CinW - truth.p_CinW) < 0.010
+        assert np.degrees(np.linalg.norm(so3.log(truth.R_CtoW.T @ camera.R_CtoW))) < 0.2
+    verdict = judge(room)
+    assert verdict.grade is Grade.GOOD
+    assert "frame: board seen by cam" in to_text(room, verdict)
+    assert len(json.loads(to_json(room, verdict))["board"]["cameras"]) == 2
+    assert room.lying is not None
+    doubled = replace(room, lying=replace(room.lying, larger=0.01, larger_sigma=0.002))
+    assert any("the board came out 1.00 % too large" in reason for reason in judge(doubled).against)
 
 
 def test_a_distance_that_is_not_what_the_tape_says_is_told_in_millimetres(room: Room) -> None:
@@ -195,7 +213,7 @@ def test_footage_that_tells_no_room_is_refused_before_anything_is_solved(
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (["--frame", "floor"], "--frame 'floor': unknown; known: spots, config"),
+        (["--frame", "floor"], "--frame 'floor': unknown; known: spots, board, config"),
         (["--apart_mm", "0.8"], "--apart_mm 0.8 mm: must be 100 to 20000 mm"),
         (["--origin_mm", "0,0"], "--origin_mm '0,0': must be three millimetres"),
         (["--seconds", "1"], "--seconds 1 s: must be 5 to 600 s"),
