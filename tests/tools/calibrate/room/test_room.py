@@ -11,8 +11,8 @@ import pytest
 
 from bridge.settings import RigOrigin, load_settings, rig_of
 from tests.tools.calibrate.room.test_lying import FLOOR, CORNER_inW, stills
-from tests.tools.calibrate.room.waved import watched
 from tests.tracker.paper_rig import paper_rig
+from tools.bench.waved import watched
 from tools.calibrate.grade import Grade
 from tools.calibrate.room.bundle import zoomed
 from tools.calibrate.room.file import Record, with_room
