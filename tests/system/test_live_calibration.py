@@ -38,7 +38,12 @@ def camera() -> Iterator[MjpegCamera]:
 def lines_of(stream: IO[str]) -> queue.Queue[str]:
     """Return the lines of a stream as they come."""
     lines: queue.Queue[str] = queue.Queue()
-    threading.Thread(target=lambda: [lines.put(line) for line in stream], daemon=True).start()
+
+    def read() -> None:
+        for line in stream:
+            lines.put(line)
+
+    threading.Thread(target=read, daemon=True).start()
     return lines
 
 

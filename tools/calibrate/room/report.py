@@ -135,13 +135,12 @@ def _marker(room: Room) -> Iterator[str]:
 def _frame(room: Room) -> Iterator[str]:
     if room.lying is not None:
         yield from _board(room.lying)
-    if room.floor is None:
+    if room.floor is None or room.floor_sigmas is None:
         return
-    spot_m = 1e-3 * room.spot_mm
     stands = ", ".join(f"{stand.from_s:.1f} to {stand.to_s:.1f} s" for stand in room.floor.stands)
     yield (
-        f"frame: spots at {stands}; level to {room.floor.tilt_deg(spot_m):.2f} deg, heading to "
-        f"{room.floor.heading_deg(spot_m):.2f} deg"
+        f"frame: spots at {stands}; level to {room.floor_sigmas.tilt_deg:.2f} deg, heading to "
+        f"{room.floor_sigmas.heading_deg:.2f} deg"
     )
     off_mm = scale_off_mm(room)
     if off_mm is not None and room.apart_m is not None:

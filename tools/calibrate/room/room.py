@@ -8,6 +8,7 @@ import numpy as np
 
 from tools.calibrate.board import Board
 from tools.calibrate.room.certainty import camera_covariance, turned
+from tools.calibrate.room.floor_sigmas import FloorSigmas, floor_sigmas
 from tools.calibrate.room.footage import Footage
 from tools.calibrate.room.gauge import moved
 from tools.calibrate.room.held_out import HeldOut, judged
@@ -47,7 +48,7 @@ class Terms:
 class Room:
     """cameras: in the room's frame, with their clocks.  covariance (7 n, 7 n): see `certainty.camera_covariance`.
 
-    lying: the board on the floor, where it gives the frame.
+    lying: the board on the floor, where it gives the frame.  floor_sigmas: of the spots', where they do.
     seen_s: how long each camera saw the marker together with another [s].
     """
 
@@ -62,6 +63,7 @@ class Room:
     apart_m: float | None
     seen_s: tuple[float, ...]
     lying: Lying | None = None
+    floor_sigmas: FloorSigmas | None = None
 
     def position_mm(self, c: int) -> Array:
         """Return one sigma of a camera's position (3,) in the room, against the other cameras [mm]."""
@@ -74,12 +76,6 @@ class Room:
     def clock_ms(self, c: int) -> float:
         """Return one sigma of a camera's clock against camera 0's [ms]."""
         return float(1e3 * self._sigmas(c)[6])
-
-    @property
-    def spot_mm(self) -> float:
-        """Return one sigma of a spot's place [mm]: the cameras' errors, and those of what stands still."""
-        cameras_mm = self.volume.point_mm if self.volume.cells else 0.0
-        return float(np.hypot(np.nan_to_num(cameras_mm), np.nan_to_num(self.held_out.spacing_mm)))
 
     def _sigmas(self, c: int) -> Array:
         return np.sqrt(np.diag(self.covariance)[CAMERA * c : CAMERA * (c + 1)])
@@ -105,11 +101,12 @@ def calibrate_room(footage: Footage, rig: Rig, terms: Terms) -> Room:
     )
     to_room = scene.cameras[0].R_CtoW @ found.adjusted.scene.cameras[0].R_CtoW.T
     covariance = turned(camera_covariance(found.adjusted), to_room)
+    held_out = judged(found, rig)
     return Room(
         cameras,
         covariance,
         found,
-        judged(found, rig),
+        held_out,
         surveyed(cameras, covariance, scene.p_BinW, terms.volume_m),
         sides,
         measured_sizes(footage, make_rig(found.cameras, rig.marker)),
@@ -117,6 +114,7 @@ def calibrate_room(footage: Footage, rig: Rig, terms: Terms) -> Room:
         terms.apart_m,
         _seen_s(found),
         lying,
+        None if floor is None else _floor_sigmas(floor, found, held_out),
     )
 
 
@@ -124,10 +122,18 @@ def _frame_of(footage: Footage, found: Found, rig: Rig, terms: Terms) -> tuple[F
     """Return the spots' frame or the board's; neither where the config's cameras give it."""
     if terms.by_spots:
         hung = np.array([camera.p_CinW for camera in found.cameras])
-        return floor_of(find_stands(found, rig), hung, terms.origin_m), None
+        stands = find_stands(found.tracks, found.scene.offsets_s, found.cameras, rig)
+        return floor_of(stands, hung, terms.origin_m), None
     if terms.board is not None:
         return None, lying_board(footage.stills, found.cameras, terms.board, terms.origin_m)
     return None, None
+
+
+def _floor_sigmas(floor: Floor, found: Found, held_out: HeldOut) -> FloorSigmas:
+    """Return what the spots are known to; a stand errs by itself as distances of balls do in what was held out."""
+    to_found = found.scene.cameras[0].R_CtoW @ found.adjusted.scene.cameras[0].R_CtoW.T
+    covariance = turned(camera_covariance(found.adjusted), to_found)
+    return floor_sigmas(floor, found.cameras, covariance, 1e-3 * float(np.nan_to_num(held_out.spacing_mm)))
 
 
 def _refuse_upside_down(scene: Scene) -> None:

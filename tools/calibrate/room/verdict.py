@@ -61,7 +61,8 @@ def scale_off_mm(room: Room) -> float | None:
 
 def scale_tolerance_mm(room: Room) -> float:
     """Return by how much it may be off by chance [mm]."""
-    return SURE * float(np.hypot(TAPE_MM, room.spot_mm))
+    spots_mm = 0.0 if room.floor_sigmas is None else room.floor_sigmas.along_mm
+    return SURE * float(np.hypot(TAPE_MM, spots_mm))
 
 
 def _graded(room: Room) -> Iterator[tuple[Grade, str]]:

@@ -12,6 +12,7 @@ import pytest
 from bridge.settings import RigOrigin, load_settings, rig_of
 from tests.tools.calibrate.room.test_lying import FLOOR, CORNER_inW, stills
 from tests.tracker.paper_rig import paper_rig
+from tests.tracker.rigs import ring_rig
 from tools.bench.waved import watched
 from tools.calibrate.grade import Grade
 from tools.calibrate.room.bundle import zoomed
@@ -22,7 +23,7 @@ from tools.calibrate.room.radius import measured_sizes
 from tools.calibrate.room.report import to_json, to_text
 from tools.calibrate.room.room import Room, Terms, calibrate_room
 from tools.calibrate.room.sides import Side, refuse_swapped
-from tools.calibrate.room.spots import Stand, floor_of
+from tools.calibrate.room.spots import Stand, find_stands, floor_of
 from tools.calibrate.room.tracks import Track
 from tools.calibrate.room.verdict import judge
 from tools.calibrate.room.worth import worth_of
@@ -61,6 +62,13 @@ def test_three_spots_put_the_cameras_where_they_are_in_the_room_and_the_verdict_
     for camera, truth in zip(room.cameras, paper_rig().cameras, strict=True):
         assert np.linalg.norm(camera.p_CinW - truth.p_CinW) < 0.006
         assert np.degrees(np.linalg.norm(so3.log(truth.R_CtoW.T @ camera.R_CtoW))) < 0.15
+    assert room.floor_sigmas is not None
+    turns = [
+        so3.log(found.R_CtoW @ truth.R_CtoW.T) for found, truth in zip(room.cameras, paper_rig().cameras, strict=True)
+    ]
+    tilt_x, tilt_y, heading = np.abs(np.degrees(np.mean(turns, axis=0))).tolist()
+    assert max(tilt_x, tilt_y) < 3.0 * room.floor_sigmas.tilt_deg < 0.1
+    assert heading < 3.0 * room.floor_sigmas.heading_deg < 0.1
     verdict = judge(room)
     assert (verdict.grade, verdict.against) == (Grade.GOOD, ())
     assert to_text(room, verdict).splitlines()[-1].startswith("Good: points are known to ")
@@ -162,7 +170,19 @@ def test_the_room_file_is_the_config_with_measured_cameras_and_runs(room: Room, 
 
 
 def stands(places: list[tuple[float, float, float]], up: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> list[Stand]:
-    return [Stand(float(k), k + 2.0, np.array(place), np.array(up)) for k, place in enumerate(places)]
+    unseen = np.full((2, 3, 2), np.nan)
+    return [Stand(float(k), k + 2.0, np.array(place), np.array(up), unseen) for k, place in enumerate(places)]
+
+
+def test_a_camera_that_sees_the_vehicle_come_but_not_stand_does_not_put_the_spot_aside() -> None:
+    rig, t_s = ring_rig(3), np.arange(0.0, 4.0, 1.0 / 15.0)
+    places_m = np.outer(np.minimum(t_s - 1.0, 0.0), [0.3, 0.3, 0.0])  # it comes for a second, then it stands
+    balls_inW = places_m[:, None] + rig.marker.points_inB
+    uv_px = [camera.project(balls_inW.reshape(-1, 3))[0].reshape(-1, 3, 2) for camera in rig.cameras]
+    seen = [len(t_s), len(t_s), 15]
+    tracks = [Track(t_s[:n], uv[:n], np.full((n, 3), 0.1)) for n, uv in zip(seen, uv_px, strict=True)]
+    (stand,) = find_stands(tracks, np.zeros(3), rig.cameras, rig)
+    np.testing.assert_allclose(stand.p_BinW, np.zeros(3), atol=1e-3)
 
 
 @pytest.mark.parametrize(
