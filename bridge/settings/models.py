@@ -75,7 +75,7 @@ class MeasuredSettings(Section):
     source: Name
     verdict: Literal["good", "usable", "not good"]
     reasons: tuple[str, ...] = ()
-    frame: Literal["spots", "config"]
+    frame: Literal["spots", "board", "config"]
     point_mm: Real
     worst_point_mm: Real
     spacing_mm: Real

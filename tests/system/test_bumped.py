@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from bridge.settings import rig_of
+from bridge.settings import RigOrigin, load_settings, rig_of, shipped_configs
 from tests.system.bumps import BUMP_S, CLOCKS, DURATION_S, SETTINGS, WITHIN_S, Bump, Told, flown, log_of
 from tools.calibrate.formats.own import read_own
 from tools.calibrate.refine.session import RefineRequest, run_refine
@@ -27,13 +27,14 @@ PERIOD_NS = 66_666_667
 
 TURNED = Bump(Knock(1, turn_deg=(0.2, 0.0, 0.0)))
 ASIDE = Bump(Knock(0, shift_mm=(5.0, 0.0, 0.0)), seed=2)
+OF_FOUR = Bump(Knock(2, turn_deg=(0.0, 0.2, 0.0)), cameras=4)
 BUMPS = [
     TURNED,
     ASIDE,
+    OF_FOUR,
     Bump(Knock(0, turn_deg=(0.0, 0.2, 0.0)), gamma=2.2),
     Bump(Knock(1, turn_deg=(0.0, 0.0, 0.2))),
     Bump(Knock(0, shift_mm=(0.0, 0.0, 5.0))),
-    Bump(Knock(2, turn_deg=(0.0, 0.2, 0.0)), cameras=4),
     Bump(Knock(1, shift_mm=(0.0, 5.0, 0.0)), cameras=4),
 ]
 
@@ -55,6 +56,12 @@ def hand(camera: int, t_s: float) -> Trouble:
 def lamp(_camera: int, t_s: float) -> Trouble:
     """Return a lamp that is switched off, and later another one of another colour on."""
     return Trouble(gains_bgr=(0.5, 0.5, 0.5) if t_s < 12.0 else (0.8, 1.0, 1.1)) if t_s >= 7.0 else Trouble()
+
+
+def refining(
+    log: Path, moved: tuple[str, ...] = (), out: Path | None = None, config: str | None = None
+) -> RefineRequest:
+    return RefineRequest(log, moved, config, "Ada", out, overwrite=False, as_json=True)
 
 
 CALM = [
@@ -91,13 +98,13 @@ def test_a_clean_flight_a_hand_and_a_lamp_are_no_bump(calm: Bump) -> None:
     assert {each.brief for each in health} == {""}
 
 
-@pytest.mark.parametrize("bump", [TURNED, ASIDE], ids=["turned", "aside"])
+@pytest.mark.parametrize("bump", [TURNED, ASIDE, OF_FOUR], ids=["turned", "aside", "four"])
 def test_the_log_mends_the_camera(bump: Bump, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Its rays to the vehicle miss it by less than a third of what they did, and by no more than refine owns up to."""
     assert bump.knock is not None
     log, rig, index = log_of(flown(bump), bump.rig(), tmp_path / "a.mcap"), bump.rig(), bump.knock.camera
     out = tmp_path / "room.toml"
-    run_refine(RefineRequest(log, (), out, overwrite=False, as_json=True))
+    run_refine(refining(log, out=out), CLOCKS)
     figures = json.loads(capsys.readouterr().out)
     assert figures["grade"] == "good"
     assert figures["moves"][0]["name"] == f"cam{index}"
@@ -105,17 +112,49 @@ def test_the_log_mends_the_camera(bump: Bump, tmp_path: Path, capsys: pytest.Cap
     truth, mended = knocked(rig.cameras[index], bump.knock), read_own(out)[index]
     left_mm, before_mm = (mean_miss_mm(bump, truth, camera) for camera in (mended, rig.cameras[index]))
     assert left_mm < 0.3 * before_mm
-    assert left_mm < 3.0 * figures["sigma_mm"]
+    assert left_mm < 2.0 * figures["moves"][0]["rays_mm"]
+    for clock in figures["clocks"]:  # all are triggered at once
+        assert abs(clock["offset_ms"]) < 4.0 * clock["sigma_ms"]
+        assert clock["sigma_ms"] < 0.5
+
+
+def test_mended_cameras_are_written_into_the_config_flown_with_or_the_logs_own(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log, config = log_of(flown(TURNED), TURNED.rig(), tmp_path / "a.mcap"), tmp_path / "mine.toml"
+    config.write_text("# Ada's room\n" + (shipped_configs()["lab"]).read_text("utf-8"), encoding="utf-8")
+    mended = []
+    for name, of in (("b.toml", str(config)), ("c.toml", None)):
+        run_refine(refining(log, out=tmp_path / name, config=of), CLOCKS)
+        mended.append(load_settings(tmp_path / name))
+    assert (tmp_path / "b.toml").read_text("utf-8").startswith("# Ada's room\n")
+    assert "Nominal cameras" not in (tmp_path / "b.toml").read_text("utf-8")
+    for settings in mended:
+        assert settings.marker == SETTINGS.marker
+        assert settings.rig.measured is not None
+        assert [one.name for one in settings.rig.measured.cameras] == ["cam1"]
+        assert rig_of(settings, TURNED.rig().cameras).origin is RigOrigin.MEASURED
+    assert mended[0].rig.cameras[1].T_CtoW == mended[1].rig.cameras[1].T_CtoW != SETTINGS.rig.cameras[1].T_CtoW
+    assert mended[0].links == SETTINGS.links
+    capsys.readouterr()
 
 
 def test_a_log_in_which_nothing_moved_says_so(tmp_path: Path) -> None:
     log = log_of(flown(CALM[0]), CALM[0].rig(), tmp_path / "a.mcap")
     with pytest.raises(OperatorError, match="no camera moved in that flight; name one with --moved"):
-        run_refine(RefineRequest(log, (), None, overwrite=False, as_json=False))
+        run_refine(refining(log), CLOCKS)
     with pytest.raises(OperatorError, match="--moved left: no such camera; the log has cam0, cam1"):
-        run_refine(RefineRequest(log, ("left",), None, overwrite=False, as_json=False))
+        run_refine(refining(log, ("left",)), CLOCKS)
     with pytest.raises(OperatorError, match="none is left to hold the room"):
-        run_refine(RefineRequest(log, ("cam0", "cam1"), None, overwrite=False, as_json=False))
+        run_refine(refining(log, ("cam0", "cam1")), CLOCKS)
+
+
+def test_a_config_of_other_cameras_is_refused(tmp_path: Path) -> None:
+    log, config = log_of(flown(TURNED), TURNED.rig(), tmp_path / "a.mcap"), tmp_path / "mine.toml"
+    lab = shipped_configs()["lab"].read_text("utf-8")
+    config.write_text(lab.replace('name = "cam1"', 'name = "left"'), encoding="utf-8")
+    with pytest.raises(OperatorError, match="its cameras are cam0, left, the log's cam0, cam1; name the config that"):
+        run_refine(refining(log, config=str(config)), CLOCKS)
 
 
 def laps(recording: Path, knock: Knock | None) -> Told:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 from rich.console import Console
@@ -13,6 +14,7 @@ from rich.table import Table
 from bridge.settings import Settings
 from bridge.summary import to_text
 from tools.bench.accuracy import Accuracy, Limit, measure_accuracy
+from tools.bench.calibration import CLAIM_DEG, CLAIM_MM, CLAIM_MS, Rooms, measure_calibration
 from tools.bench.consistency import Average, measure_consistency
 from tools.bench.export import measure_export
 from tools.bench.memory import measure_memory
@@ -150,6 +152,40 @@ def bench_rooms(settings: Settings, seed: int, as_json: bool) -> None:
         table.add_row(r.name, f"{r.estimates}/{r.frames}", *errors, f"{r.nees:.2f}", str(r.wrong), *speeds)
     console = Console()
     Console(width=max(console.width, WIDTH)).print(table)
+
+
+def bench_calibration(settings: Settings, seeds: int, jpeg_quality: int, as_json: bool) -> None:
+    """Show how well drawn rooms are calibrated."""
+    results = measure_calibration(settings, seeds, (0, jpeg_quality) if jpeg_quality else (0,))
+    if as_json:
+        _print_json([dataclasses.asdict(result) for result in results])
+        return
+    table = Table("rooms", box=None, pad_edge=False)
+    names = ("place mm mean", "max", "of sigma", "turn deg max", "of sigma", "clock ms max", "of sigma", "too long %")
+    for name in (*names, "beyond the claim"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for kind in results:
+        through = f", JPEG {kind.jpeg_quality}" if kind.jpeg_quality else ""
+        table.add_row(f"{len(kind.rooms)} of {kind.cameras} cameras{through}", *_missed(kind))
+    console = Console()
+    Console(width=max(console.width, WIDTH)).print(table)
+    console.print(
+        f"claim: {CLAIM_MM:g} mm, {CLAIM_DEG:g} deg, {CLAIM_MS:g} ms of every camera; beyond it so many rooms in "
+        "place, turn and clock",
+        soft_wrap=True,
+    )
+
+
+def _missed(kind: Rooms) -> Iterator[str]:
+    """Yield the cells of a kind of rooms: means of the first and of the scale, else its worst."""
+    rooms = [dataclasses.astuple(room) for room in kind.rooms]
+    place, turn, clock, of_place, of_turn, of_clock, longer = zip(*rooms, strict=True)
+    yield f"{sum(place) / len(place):.2f}"
+    for worst, of_sigma, digits in ((place, of_place, 2), (turn, of_turn, 3), (clock, of_clock, 3)):
+        yield f"{max(worst):.{digits}f}"
+        yield f"{max(of_sigma):.1f}"
+    yield f"{100 * sum(longer) / len(longer):+.3f}"
+    yield " ".join(str(count) for count in kind.beyond)
 
 
 def _average(value: Average) -> list[str]:

@@ -99,3 +99,21 @@ def rooms(
     from tools.bench.commands import bench_rooms
 
     bench_rooms(load_settings(config), seed, json)
+
+
+@bench.command()
+def calibration(
+    seeds: Annotated[int, typer.Option(help="Drawn rooms of each kind.", min=1)] = 3,
+    jpeg_quality: Annotated[
+        int,
+        typer.Option("--jpeg_quality", "--jpeg-quality", help="Also through JPEG; 0 for none.", min=0, max=100),
+    ] = 90,
+    config: ConfigOption = "lab",
+    json: JsonOption = False,
+) -> None:
+    """Calibrate drawn rooms of two to eight cameras with the waved marker, and hold them against the truth."""
+    tell_of_compiling()
+    from bridge.settings import load_settings
+    from tools.bench.commands import bench_calibration
+
+    bench_calibration(load_settings(config), seeds, jpeg_quality, json)

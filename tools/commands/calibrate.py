@@ -114,15 +114,28 @@ def room(
         Path | None, typer.Option(help="Write the room file here: the config with these cameras.", metavar="ROOM.toml")
     ] = None,
     frame: Annotated[
-        str, typer.Option(help="spots: level, heading and origin by three spots; config: by the config's cameras.")
+        str,
+        typer.Option(
+            help="spots: level, heading and origin by three spots; board: by one on the floor; config: by its cameras."
+        ),
     ] = "spots",
+    kind: KindOption = "charuco",
+    corners: CornersOption = "4x3",
+    square_mm: Annotated[
+        float, typer.Option("--square_mm", "--square-mm", help="A square's side of the board on the floor.")
+    ] = 75.0,
+    marker_mm: MarkerOption = None,
+    dictionary: DictionaryOption = "4X4_50",
     apart_mm: Annotated[
         float | None, typer.Option("--apart_mm", "--apart-mm", help="From the first spot to the second, by tape.")
     ] = None,
     origin_mm: Annotated[
         str,
         typer.Option(
-            "--origin_mm", "--origin-mm", help="The marker's middle in the room on the first spot.", metavar="X,Y,Z"
+            "--origin_mm",
+            "--origin-mm",
+            help="Where in the room the marker's middle is on the first spot, or the board's first inner corner.",
+            metavar="X,Y,Z",
         ),
     ] = "0,0,0",
     refine_intrinsics: Annotated[
@@ -136,13 +149,17 @@ def room(
     """Find where the cameras hang and how their clocks differ, from the marker waved through the room.
 
     Then the vehicle stands for 3 s on each of three level spots: the first is the origin, the second lies along x, the
-    third aside (docs/room.md). Exit code 0: good or usable. 1: not good, with the reasons. 2: something to mend first.
+    third aside. Or a board lies on the floor, its first inner corner the origin, its x axis the room's (docs/room.md).
+    Exit code 0: good or usable. 1: not good, with the reasons. 2: something to mend first.
     """
+    from tools.calibrate.board import make_board
+    from tools.calibrate.command import kind_of
     from tools.calibrate.grade import Grade
     from tools.calibrate.room.session import RoomRequest, run_room
 
+    floor = make_board(kind_of(kind), corners, square_mm, marker_mm, dictionary)
     request = RoomRequest(
-        config, source, tuple(cameras or ()), frame, origin_mm, apart_mm, refine_intrinsics, by, seconds, out,
+        config, source, tuple(cameras or ()), frame, floor, origin_mm, apart_mm, refine_intrinsics, by, seconds, out,
         overwrite, json,
     )  # fmt: skip
     tell_of_compiling()
@@ -152,6 +169,7 @@ def room(
 
 @calibrate.command()
 def refine(
+    context: typer.Context,
     log: Annotated[Path, typer.Argument(help="The log of a flight in which a camera was bumped.")],
     moved: Annotated[
         list[str] | None,
@@ -159,8 +177,13 @@ def refine(
             help="The camera that moved; else those that the flight named. May be given again.", metavar="CAM"
         ),
     ] = None,
+    config: Annotated[
+        str | None,
+        typer.Option(help="The config flown with, whose comments are kept; else the log's.", metavar="CONFIG"),
+    ] = None,
+    by: Annotated[str, typer.Option(help="Who mended, for the room file.", metavar="NAME")] = "",
     out: Annotated[
-        Path | None, typer.Option(help="Write the cameras here, as [[rig.cameras]].", metavar="ROOM.toml")
+        Path | None, typer.Option(help="Write the room file here: the config with these cameras.", metavar="ROOM.toml")
     ] = None,
     overwrite: OverwriteOption = False,
     json: JsonOption = False,
@@ -172,5 +195,6 @@ def refine(
     from tools.calibrate.grade import Grade
     from tools.calibrate.refine.session import RefineRequest, run_refine
 
-    if run_refine(RefineRequest(log, tuple(moved or ()), out, overwrite, json)).grade is Grade.NOT_GOOD:
+    request = RefineRequest(log, tuple(moved or ()), config, by, out, overwrite, json)
+    if run_refine(request, clocks_of(context)).grade is Grade.NOT_GOOD:
         raise typer.Exit(EXIT_CALIBRATION_NOT_GOOD)

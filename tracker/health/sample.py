@@ -14,7 +14,7 @@ import numpy as np
 
 from tracker.filter.measure import Indices, camera_table, marker_points, pixels
 from tracker.rig import Rig
-from tracker.state import State
+from tracker.state import OFFSETS, State
 from tracker.types import Array, BallSighting
 
 MOTION = 6  # of a camera: its place in W [m], then its turn in W about itself [rad]
@@ -33,12 +33,14 @@ class Linear:
     """Sightings held against a pose, whitened by their noise.
 
     r (2n,): residuals.  J (2n, 6), D (2n, 6 cameras): their slopes by the pose's error and by motions of the cameras.
+    C (2n, cameras - 1): those by the clock offsets of all cameras but the first [1/s].
     weight (2n,): one over each one's sigma [1/px].
     """
 
     r: Array
     J: Array
     D: Array
+    C: Array
     weight: Array
 
 
@@ -71,7 +73,7 @@ def linearised(sightings: Sequence[BallSighting], state: State, rig: Rig, sigma_
     weight = np.repeat(1.0 / np.sqrt(variances), 2)
     r = weight * (np.concatenate([sighting.uv_px for sighting in sightings]) - h)
     D = weight[:, None] * _by_cameras(H[:, :3], cameras, balls, state, rig)
-    return Linear(r, weight[:, None] * H[:, :6], D, weight)
+    return Linear(r, weight[:, None] * H[:, :6], D, weight[:, None] * H[:, OFFSETS:], weight)
 
 
 def _by_cameras(J_px: Array, cameras: Indices, balls: Indices, state: State, rig: Rig) -> Array:

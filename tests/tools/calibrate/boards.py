@@ -7,6 +7,7 @@ import numpy as np
 
 from tools.calibrate.board import Board, charuco_of
 from tools.calibrate.find import View
+from tracker.camera import Camera
 from tracker.types import Array, Image
 
 SIZE_PX = (640, 480)
@@ -49,20 +50,39 @@ def view_of(board: Board, pose: tuple[Array, Array], noise_px: float, seed: int)
 
 
 def picture_of(board: Board, pose: tuple[Array, Array], seed: int, blur_px: float = 0.7) -> Image:
-    """Draw a ChArUco board through the lens: each pixel's ray meets the board's plane."""
+    """Draw a ChArUco board through the lens."""
+    pixels = _pixels(SIZE_PX)
+    flat: Array = np.asarray(cv2.undistortPoints(pixels[:, None], K, DISTORTION), dtype=np.float64).reshape(-1, 2)
+    rays = np.column_stack((flat, np.ones(len(flat))))
+    return _drawn(board, rays, pose, SIZE_PX, seed, blur_px)
+
+
+def picture_by(camera: Camera, board: Board, R_DtoW: Array, p_DinW: Array, seed: int) -> Image:
+    """Draw a ChArUco board that lies in the room, as one of its cameras sees it."""
+    size_px = camera.width_px, camera.height_px
+    pose = np.asarray(camera.R_CtoW.T @ R_DtoW), camera.in_camera(p_DinW[None])[0]
+    return _drawn(board, camera.bearings(_pixels(size_px)), pose, size_px, seed, 0.7)
+
+
+def _pixels(size_px: tuple[int, int]) -> Array:
+    columns, rows = np.meshgrid(np.arange(size_px[0]), np.arange(size_px[1]))
+    return np.column_stack((columns.ravel(), rows.ravel())).astype(np.float64)
+
+
+def _drawn(
+    board: Board, rays: Array, pose: tuple[Array, Array], size_px: tuple[int, int], seed: int, blur_px: float
+) -> Image:
+    """Draw a board (R, t) in the camera: each pixel's ray meets its plane."""
     squares = np.array([board.columns + 1, board.rows + 1])
     drawn = charuco_of(board).generateImage(tuple(int(n) for n in squares * PIXELS_PER_SQUARE))
     margin = MARGIN_SQUARES * PIXELS_PER_SQUARE
     paper = cv2.copyMakeBorder(drawn, margin, margin, margin, margin, cv2.BORDER_CONSTANT, value=(255,))
-    columns, rows = np.meshgrid(np.arange(SIZE_PX[0]), np.arange(SIZE_PX[1]))
-    pixels = np.column_stack((columns.ravel(), rows.ravel())).astype(np.float64)
-    rays = np.column_stack((cv2.undistortPoints(pixels[:, None], K, DISTORTION).reshape(-1, 2), np.ones(len(pixels))))
     R, t = pose
     depth = (R[:, 2] @ t) / (rays @ R[:, 2])
     on_board_m = (rays * depth[:, None] - t) @ R
     # The first inner corner is the board's origin here; OpenCV draws from the outer corner, pixel centres at integers.
     on_paper = (on_board_m[:, :2] / board.square_m + 1 + MARGIN_SQUARES) * PIXELS_PER_SQUARE - 0.5
-    maps = on_paper.reshape(SIZE_PX[1], SIZE_PX[0], 2).astype(np.float32)
+    maps = on_paper.reshape(size_px[1], size_px[0], 2).astype(np.float32)
     image = cv2.remap(paper, maps[..., 0], maps[..., 1], cv2.INTER_AREA, borderValue=(90,))
     image = cv2.GaussianBlur(image, (0, 0), blur_px)
     noise = np.random.default_rng(seed).normal(0.0, 2.0, image.shape)

@@ -11,7 +11,7 @@ from tools.calibrate.grade import Grade
 from tools.calibrate.refine.judge import Judged
 
 LAST = {
-    Grade.GOOD: "Good: put these cameras into the config and fly.",
+    Grade.GOOD: "Good: fly with the room file.",
     Grade.USABLE: "Usable: fly with care, and calibrate the room anew when there is time.",
     Grade.NOT_GOOD: "Not good: calibrate the room anew (posebridge calibrate room).",
 }
@@ -19,7 +19,7 @@ LAST = {
 
 def to_text(judged: Judged) -> str:
     """Return the page."""
-    return "\n".join([*_moves(judged), *_held_out(judged), judged.reason, LAST[judged.grade]])
+    return "\n".join([*_moves(judged), *_clocks(judged), *_held_out(judged), judged.reason, LAST[judged.grade]])
 
 
 def to_json(judged: Judged) -> str:
@@ -31,7 +31,16 @@ def to_json(judged: Judged) -> str:
 def _moves(judged: Judged) -> Iterator[str]:
     for move in judged.moves:
         turn, shift = (" ".join(f"{x:+.{n}f}" for x in v) for v, n in ((move.turn_deg, 3), (move.shift_mm, 1)))
-        yield f"{move.name}: turned {turn} deg about its x, y, z; went {shift} mm along them"
+        yield (
+            f"{move.name}: turned {turn} deg about its x, y, z; went {shift} mm along them; its rays meet the vehicle "
+            f"to {move.rays_mm:.2f} mm"
+        )
+
+
+def _clocks(judged: Judged) -> Iterator[str]:
+    if judged.clocks:
+        late = ", ".join(f"{one.name} {one.offset_ms:.2f} +- {one.sigma_ms:.2f} ms" for one in judged.clocks)
+        yield f"clocks: {late} late by the first camera's"
 
 
 def _held_out(judged: Judged) -> Iterator[str]:

@@ -7,6 +7,7 @@ which turns cameras and stretches rooms. The tracker itself would do, but its ga
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -26,14 +27,83 @@ must not be where the marker happened to end."""
 DOUBT = 3.0  # times the sigma of the first look
 
 
-def looked_again(footage: Footage, rig: Rig) -> tuple[Track, ...]:
-    """Fit every ball's image again, in two passes: one to learn how each camera shows balls, one to measure.
+@dataclass(frozen=True, slots=True, eq=False)
+class Again:
+    """One camera's images, with what is known by now of the balls in them.
+
+    rig: cameras and clocks as known.  camera: which one.  clips: its images, at times t_s (m,) by the rig's clocks [s].
+    views (m, balls, 3): each ball's depth [m] and speed u, v [px/s]; NaN where two cameras did not see it.
+    """
+
+    rig: Rig
+    camera: int
+    clips: Sequence[Clip]
+    t_s: Array
+    views: Array
+
+    def known(self) -> list[int]:
+        """Return the images in which every ball's depth and speed are known."""
+        told = np.isfinite(self.views).all(axis=(1, 2)) & (np.nan_to_num(self.views[:, :, 0]) > 0.0).all(axis=1)
+        return np.flatnonzero(told).tolist()
+
+    def lessons(self) -> list[int]:
+        """Return some images, spread over the footage."""
+        known = self.known()
+        return known[:: max(1, len(known) // LESSONS)]
+
+    def taught(self) -> Rivals:
+        """Learn how this camera shows balls."""
+        rivals, lessons = first_rivals(), self.lessons()
+        for k in (k for sweep in range(SWEEPS) for k in lessons[sweep::SWEEPS]):
+            image = self.image(k)
+            for ball in range(len(self.rig.marker)):
+                expected = self.expected(rivals, k, ball)
+                found = fit_centre(image, expected)
+                if isinstance(found, Centre):
+                    rivals = rivals.learned(image, self.rig.cameras[self.camera], expected, found)
+        return rivals
+
+    def measured(self) -> Iterator[tuple[float, Array]]:
+        """Yield the stamps and centres of its images, fitted once it is known how it shows balls."""
+        rivals = self.taught()
+        for k in self.known():
+            image, balls = self.image(k), range(len(self.rig.marker))
+            yield float(self.t_s[k]), np.stack([self._refitted(image, rivals, k, ball) for ball in balls])
+
+    def expected(self, rivals: Rivals, k: int, ball: int) -> Expected:
+        """Return what is expected of a ball in an image."""
+        camera, known, seen = self.rig.cameras[self.camera], rivals.best, self.clips[k].centres_px[ball]
+        u_px, v_px, _ = seen.tolist()
+        depth_m, *speed_px_s = self.views[k, ball].tolist()
+        x, y, z = camera.bearings(seen[None, :2])[0].tolist()
+        return Expected(
+            (u_px, v_px),
+            camera.focal_px * self.rig.marker.balls[ball].radius_m / depth_m,
+            (speed_px_s[0], speed_px_s[1]),
+            known.shades(camera, x / z, y / z),
+            known.response,
+            ray=(x / z, y / z),
+        )
+
+    def image(self, k: int) -> Image:
+        """Return an image."""
+        camera = self.rig.cameras[self.camera]
+        return self.clips[k].frame(camera.width_px, camera.height_px).image
+
+    def _refitted(self, image: Image, rivals: Rivals, k: int, ball: int) -> Array:
+        """Return a ball's centre and one sigma (3,) [px]; that of the first look, believed less, where none fits."""
+        fit = fit_centre(image, self.expected(rivals, k, ball))
+        if isinstance(fit, Centre):
+            return np.append(fit.uv_px, sigma_px(fit))
+        return np.asarray(self.clips[k].centres_px[ball] * (1.0, 1.0, DOUBT))
+
+
+def again(footage: Footage, rig: Rig) -> tuple[Again, ...]:
+    """Return each camera's images once more.
 
     Args:
         footage: with the images kept.
         rig: cameras and clocks as known by now, well enough to tell how large a ball must look.
-    Returns:
-        Each camera's track of what two cameras saw together; times count from footage.start_ns by the rig's clocks.
     """
     clips = [[clip for clip in footage.clips if clip.camera == c] for c in range(len(rig.cameras))]
     times = [_times_s(each, rig, footage.start_ns) for each in clips]
@@ -42,9 +112,20 @@ def looked_again(footage: Footage, rig: Rig) -> tuple[Track, ...]:
         for of, each in zip(times, clips, strict=True)
     )
     return tuple(
-        track_of(_measured(each, of, _views(tracks, of, c, rig), rig), len(rig.marker))
+        Again(rig, c, each, of, _views(tracks, of, c, rig))
         for c, (each, of) in enumerate(zip(clips, times, strict=True))
     )
+
+
+def looked_again(footage: Footage, rig: Rig) -> tuple[Track, ...]:
+    """Fit every ball's image again, in two passes: one to learn how each camera shows balls, one to measure.
+
+    Args:
+        footage, rig: see `again`.
+    Returns:
+        Each camera's track of what two cameras saw together; times count from footage.start_ns by the rig's clocks.
+    """
+    return tuple(track_of(each.measured(), len(rig.marker)) for each in again(footage, rig))
 
 
 def _times_s(clips: Sequence[Clip], rig: Rig, start_ns: int) -> Array:
@@ -57,54 +138,3 @@ def _views(tracks: Sequence[Track], t_s: Array, c: int, rig: Rig) -> Array:
     uv_px = np.stack([uv.reshape(-1, 2) for uv, _ in each])
     depths_m = rig.cameras[c].in_camera(triangulated_from(uv_px, rig.cameras))[:, 2]
     return np.concatenate((depths_m.reshape(len(t_s), -1, 1), each[c][1]), axis=2)
-
-
-def _measured(clips: Sequence[Clip], t_s: Array, views: Array, rig: Rig) -> Iterator[tuple[float, Array]]:
-    """Yield the stamps and centres of one camera's images, fitted once it is known how it shows balls."""
-    known = [k for k in np.flatnonzero(np.isfinite(views).all(axis=(1, 2))).tolist() if (views[k, :, 0] > 0.0).all()]
-    rivals = first_rivals()
-    lessons = known[:: max(1, len(known) // LESSONS)]
-    for k in (k for sweep in range(SWEEPS) for k in lessons[sweep::SWEEPS]):
-        rivals = _taught(rivals, clips[k], views[k], rig)
-    for k in known:
-        image, balls = _image(clips[k], rig), range(len(rig.marker))
-        yield float(t_s[k]), np.stack([_refitted(image, rivals, clips[k], views[k], ball, rig) for ball in balls])
-
-
-def _refitted(image: Image, rivals: Rivals, clip: Clip, views: Array, ball: int, rig: Rig) -> Array:
-    """Return a ball's centre and one sigma (3,) [px]; that of the first look, believed less, where none fits now."""
-    fit = fit_centre(image, _expected(rivals, clip, views, ball, rig))
-    if isinstance(fit, Centre):
-        return np.append(fit.uv_px, sigma_px(fit))
-    return np.asarray(clip.centres_px[ball] * (1.0, 1.0, DOUBT))
-
-
-def _taught(rivals: Rivals, clip: Clip, views: Array, rig: Rig) -> Rivals:
-    """Return the rivals after one more image."""
-    image = _image(clip, rig)
-    for ball in range(len(rig.marker)):
-        expected = _expected(rivals, clip, views, ball, rig)
-        found = fit_centre(image, expected)
-        if isinstance(found, Centre):
-            rivals = rivals.learned(image, rig.cameras[clip.camera], expected, found)
-    return rivals
-
-
-def _expected(rivals: Rivals, clip: Clip, views: Array, ball: int, rig: Rig) -> Expected:
-    camera, known = rig.cameras[clip.camera], rivals.best
-    u_px, v_px, _ = clip.centres_px[ball].tolist()
-    depth_m, *speed_px_s = views[ball].tolist()
-    x, y, z = camera.bearings(clip.centres_px[ball : ball + 1, :2])[0].tolist()
-    return Expected(
-        (u_px, v_px),
-        camera.focal_px * rig.marker.balls[ball].radius_m / depth_m,
-        (speed_px_s[0], speed_px_s[1]),
-        known.shades(camera, x / z, y / z),
-        known.response,
-        ray=(x / z, y / z),
-    )
-
-
-def _image(clip: Clip, rig: Rig) -> Image:
-    camera = rig.cameras[clip.camera]
-    return clip.frame(camera.width_px, camera.height_px).image

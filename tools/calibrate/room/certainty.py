@@ -65,7 +65,7 @@ def point_sigmas_m(cameras: tuple[Camera, ...], covariance: Array, points_inW: A
     slopes = np.zeros((len(points_inW), 3, len(covariance)))
     for k in (k for k in range(len(covariance)) if k % CAMERA < CAMERA - 1):
         step = max(1e-9, 1e-2 * float(np.sqrt(covariance[k, k])))
-        slopes[:, :, k] = (triangulated_from(uv_px, _moved(cameras, k, step)) - nominal) / step
+        slopes[:, :, k] = (triangulated_from(uv_px, off_by(cameras, k, step)) - nominal) / step
     spread = np.einsum("nik,kl,nil->n", slopes, covariance, slopes)
     return np.asarray(np.sqrt(spread / 3.0))
 
@@ -77,7 +77,7 @@ def seen_px(camera: Camera, points_inW: Array) -> Array:
     return np.where(within[:, None], uv_px, np.nan)
 
 
-def _moved(cameras: tuple[Camera, ...], k: int, step: float) -> tuple[Camera, ...]:
+def off_by(cameras: tuple[Camera, ...], k: int, step: float) -> tuple[Camera, ...]:
     """Return cameras of which one is off by a step of its unknown k."""
     c, axis = divmod(k, CAMERA)
     camera = cameras[c]

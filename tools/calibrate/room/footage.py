@@ -44,12 +44,16 @@ class Clip:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Footage:
-    """What was kept. start_ns: the first frame's stamp, from which the tracks' times count.  frames: of each camera."""
+    """What was kept. start_ns: the first frame's stamp, from which the tracks' times count.  frames: of each camera.
+
+    stills: whole pictures of the beginning, if asked for.
+    """
 
     start_ns: int
     frames: tuple[int, ...]
     tracks: tuple[Track, ...]
     clips: tuple[Clip, ...]
+    stills: tuple[Frame, ...] = ()
 
 
 def _silent(_line: str) -> None:
@@ -59,8 +63,10 @@ def _silent(_line: str) -> None:
 class Watcher:
     """Look for the marker in frames as they come, and keep what shows it."""
 
-    def __init__(self, rig: Rig) -> None:
+    def __init__(self, rig: Rig, stills: int = 0) -> None:
         self._rig = rig
+        self._wanted = stills
+        self._stills: list[Frame] = []
         self._found: list[list[tuple[float, Array]]] = [[] for _ in rig.cameras]
         self._frames = [0] * len(rig.cameras)
         self._clips: list[Clip] = []
@@ -86,6 +92,8 @@ class Watcher:
             return
         camera = self._rig.cameras[event.camera]
         _check_size(event, camera)
+        if sum(still.camera == event.camera for still in self._stills) < self._wanted:
+            self._stills.append(event)
         self._frames[event.camera] += 1
         centres = find_balls(event, self._rig)
         if centres is not None:
@@ -102,20 +110,23 @@ class Watcher:
     def footage(self) -> Footage:
         """Return what was kept."""
         tracks = tuple(track_of(each, len(self._rig.marker)) for each in self._found)
-        return Footage(self._start_ns or 0, tuple(self._frames), tracks, tuple(self._clips))
+        return Footage(self._start_ns or 0, tuple(self._frames), tracks, tuple(self._clips), tuple(self._stills))
 
 
-def watch(events: Iterable[Event], rig: Rig, longest_s: float, tell: Callable[[str], None] = _silent) -> Footage:
+def watch(
+    events: Iterable[Event], rig: Rig, longest_s: float, tell: Callable[[str], None] = _silent, stills: int = 0
+) -> Footage:
     """Find the balls in all frames of a source, up to a length [s], or until none shows them for ten seconds.
 
     The clock offsets that the rig knows are in the tracks' times, not in the clips'. Ctrl-C ends it as its end would.
 
     Args:
         tell: is told every five seconds of the footage how often each camera has seen the marker.
+        stills: how many whole pictures of each camera to keep from the beginning.
     Raises:
         OperatorError: a picture of another size than the calibration's.
     """
-    watcher, told = Watcher(rig), 0
+    watcher, told = Watcher(rig, stills), 0
     try:
         for event in events:
             watcher.take(event)

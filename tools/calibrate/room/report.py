@@ -9,6 +9,7 @@ import orjson
 
 from tools.calibrate.grade import Grade
 from tools.calibrate.room.held_out import HeldOut
+from tools.calibrate.room.lying import Lying
 from tools.calibrate.room.room import Room
 from tools.calibrate.room.verdict import Verdict, scale_off_mm, scale_tolerance_mm
 from tools.calibrate.room.volume import CELLS
@@ -68,6 +69,14 @@ def to_json(room: Room, verdict: Verdict) -> str:
             {"balls": list(s.names), "config_mm": s.said_mm, "found_mm": s.found_mm, "sigma_mm": s.sigma_mm}
             for s in room.sides
         ],
+        "radii": [
+            {"balls": list(s.names), "config_mm": s.said_mm, "found_mm": s.found_mm, "sigma_mm": s.sigma_mm}
+            for s in room.sizes
+        ],
+        "board": None if room.lying is None else {
+            "cameras": list(room.lying.names), "rms_px": room.lying.rms_px, "tilt_sigma_deg": room.lying.tilt_deg,
+            "heading_sigma_deg": room.lying.heading_deg, "larger": room.lying.larger,
+        },
         "scale": None if off_mm is None else {"off_mm": off_mm, "tolerance_mm": scale_tolerance_mm(room)},
     }  # fmt: skip
     return orjson.dumps(figures, option=orjson.OPT_INDENT_2).decode()
@@ -116,16 +125,22 @@ def _marker(room: Room) -> Iterator[str]:
         for side in room.sides
     )
     yield f"marker: {sides} mm, their mean taken from the config"
+    sizes = ", ".join(
+        f"{' '.join(size.names)} {size.found_mm:.2f} +- {size.sigma_mm:.2f} (config {size.said_mm:.2f})"
+        for size in room.sizes
+    )
+    yield f"ball radius: {sizes} mm"
 
 
 def _frame(room: Room) -> Iterator[str]:
-    if room.floor is None:
+    if room.lying is not None:
+        yield from _board(room.lying)
+    if room.floor is None or room.floor_sigmas is None:
         return
-    spot_m = 1e-3 * room.spot_mm
     stands = ", ".join(f"{stand.from_s:.1f} to {stand.to_s:.1f} s" for stand in room.floor.stands)
     yield (
-        f"frame: spots at {stands}; level to {room.floor.tilt_deg(spot_m):.2f} deg, heading to "
-        f"{room.floor.heading_deg(spot_m):.2f} deg"
+        f"frame: spots at {stands}; level to {room.floor_sigmas.tilt_deg:.2f} deg, heading to "
+        f"{room.floor_sigmas.heading_deg:.2f} deg"
     )
     off_mm = scale_off_mm(room)
     if off_mm is not None and room.apart_m is not None:
@@ -133,6 +148,15 @@ def _frame(room: Room) -> Iterator[str]:
             f"scale: the first two spots, measured {1e3 * room.apart_m:.1f} mm apart, came out "
             f"{1e3 * room.floor.along_m:.1f} mm, at most {scale_tolerance_mm(room):.1f} mm off by chance"
         )
+
+
+def _board(lying: Lying) -> Iterator[str]:
+    yield (
+        f"frame: board seen by {', '.join(lying.names)}, corners miss by {lying.rms_px:.2f} px; level to "
+        f"{lying.tilt_deg:.2f} deg, heading to {lying.heading_deg:.2f} deg"
+    )
+    if lying.larger is not None:
+        yield f"scale: the board came out {100 * lying.larger:+.2f} +- {100 * lying.larger_sigma:.2f} % of its size off"
 
 
 def _looks(axis_inW: np.ndarray) -> tuple[float, float]:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tools.calibrate.room.solve import Found
 from tools.calibrate.room.start import poses_of, triangulated_from
 from tools.calibrate.room.tracks import Track
 from tracker.camera import Camera
@@ -32,12 +31,16 @@ Span = tuple[float, float]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Stand:
-    """The vehicle stood still. from_s, to_s: when.  p_BinW (3,): where [m].  up_inW (3,): the marker's z."""
+    """The vehicle stood still. from_s, to_s: when.  p_BinW (3,): where [m].  up_inW (3,): the marker's z.
+
+    uv_px (cameras, balls, 2): where the balls were seen; NaN of cameras that did not see it stand.
+    """
 
     from_s: float
     to_s: float
     p_BinW: Array
     up_inW: Array
+    uv_px: Array
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,21 +59,20 @@ class Floor:
     across_m: float
     lean_deg: float
 
-    def tilt_deg(self, sigma_m: float) -> float:
-        """Return one sigma of the floor's tilt, its spots being known to sigma_m."""
-        return float(np.degrees(np.sqrt(2.0) * sigma_m / min(self.along_m, self.across_m)))
 
-    def heading_deg(self, sigma_m: float) -> float:
-        """Return one sigma of the x axis' heading, its spots being known to sigma_m."""
-        return float(np.degrees(np.sqrt(2.0) * sigma_m / self.along_m))
+def find_stands(tracks: Sequence[Track], offsets_s: Array, cameras: tuple[Camera, ...], rig: Rig) -> list[Stand]:
+    """Find where the vehicle stood still before two cameras or more, in order of time; two at one place are one.
 
-
-def find_stands(found: Found, rig: Rig) -> list[Stand]:
-    """Find where the vehicle stood still before two cameras or more, in order of time; two at one place are one."""
-    tracks = [_shifted(t, offset_s) for t, offset_s in zip(found.tracks, found.scene.offsets_s.tolist(), strict=True)]
+    Args:
+        tracks: each camera's sightings.  offsets_s (cameras,): how much later than its track says each saw [s].
+        cameras: as found.
+    """
+    tracks = [_shifted(track, offset_s) for track, offset_s in zip(tracks, offsets_s.tolist(), strict=True)]
+    still = [_still(track) for track in tracks]
     stands: list[Stand] = []
-    for from_s, to_s in _together([_still(track) for track in tracks]):
-        stand = _stand(tracks, from_s, to_s, found.cameras, rig)
+    for from_s, to_s in _together(still):
+        stood = [_stood(track, spans, (from_s, to_s)) for track, spans in zip(tracks, still, strict=True)]
+        stand = _stand(np.stack(stood), (from_s, to_s), cameras, rig)
         if stand is None:
             continue
         if stands and np.linalg.norm(stands[-1].p_BinW - stand.p_BinW) < ANOTHER_M:
@@ -166,12 +168,19 @@ def _together(spans: Sequence[Sequence[Span]]) -> list[Span]:
     return stood
 
 
-def _stand(tracks: Sequence[Track], from_s: float, to_s: float, cameras: tuple[Camera, ...], rig: Rig) -> Stand | None:
-    """Return the stand of a time; None where the balls make no marker."""
-    uv_px = np.full((len(tracks), len(rig.marker), 2), np.nan)
-    for c, track in enumerate(tracks):
-        stood = (track.t_s >= from_s) & (track.t_s <= to_s)
-        if stood.any():
-            uv_px[c] = np.median(track.uv_px[stood], axis=0)
+def _stood(track: Track, spans: Sequence[Span], when: Span) -> Array:
+    """Return where a camera saw the balls (balls, 2) while they stood; NaN if it saw them pass at best.
+
+    Its own word counts: a camera that sees the vehicle come but not stand would put the spot beside its place.
+    """
+    nowhere = np.full(track.uv_px.shape[1:], np.nan)
+    own = [(max(from_s, when[0]), min(to_s, when[1])) for from_s, to_s in spans]
+    from_s, to_s = max(own, key=lambda span: span[1] - span[0], default=(0.0, 0.0))
+    stood = (track.t_s >= from_s) & (track.t_s <= to_s)
+    return np.median(track.uv_px[stood], axis=0) if to_s - from_s > LEAST_STILL_S / 2.0 and stood.any() else nowhere
+
+
+def _stand(uv_px: Array, when: Span, cameras: tuple[Camera, ...], rig: Rig) -> Stand | None:
+    """Return the stand of a time by what the cameras saw (cameras, balls, 2); None where that makes no marker."""
     p_BinW, R_BtoW = poses_of(triangulated_from(uv_px, cameras)[None], rig)
-    return Stand(from_s, to_s, p_BinW[0], R_BtoW[0, :, 2]) if np.isfinite(p_BinW).all() else None
+    return Stand(*when, p_BinW[0], R_BtoW[0, :, 2], uv_px) if np.isfinite(p_BinW).all() else None

@@ -12,8 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from tools.calibrate.grade import Grade
+from tools.calibrate.room.lying import Lying
+from tools.calibrate.room.radius import Size, together
 from tools.calibrate.room.room import Room
-from tools.calibrate.room.sides import Side
+from tools.calibrate.room.sides import SIDE_MM, SURE, Side
 
 GOOD_POINT_MM, USABLE_POINT_MM = 5.0, 15.0  # one sigma, worst cell
 GOOD_SPACING_MM, USABLE_SPACING_MM = 2.0, 5.0  # 95 % of the held out
@@ -22,8 +24,6 @@ GOOD_CLOCK_MS, USABLE_CLOCK_MS = 0.5, 3.0  # one sigma: at 1 m/s a millisecond i
 GOOD_VISITED, USABLE_VISITED = 0.3, 0.1  # of the cells that two cameras see
 GOOD_SEEN_S, USABLE_SEEN_S = 10.0, 4.0
 WILD_SHARE = 0.2
-SURE = 3.0  # sigmas from which a difference is no chance
-SIDE_MM = 0.5  # what a ruler errs by
 TAPE_MM = 2.0  # what a tape errs by, one sigma
 FAR_MM, FAR_DEG = 500.0, 20.0
 
@@ -61,7 +61,8 @@ def scale_off_mm(room: Room) -> float | None:
 
 def scale_tolerance_mm(room: Room) -> float:
     """Return by how much it may be off by chance [mm]."""
-    return SURE * float(np.hypot(TAPE_MM, room.spot_mm))
+    spots_mm = 0.0 if room.floor_sigmas is None else room.floor_sigmas.along_mm
+    return SURE * float(np.hypot(TAPE_MM, spots_mm))
 
 
 def _graded(room: Room) -> Iterator[tuple[Grade, str]]:
@@ -71,6 +72,8 @@ def _graded(room: Room) -> Iterator[tuple[Grade, str]]:
     yield from _of_footage(room)
     for side in room.sides:
         yield from _of_side(side)
+    yield from _of_sizes(room.sizes)
+    yield from _of_board(room.lying)
     off_mm = scale_off_mm(room)
     if room.floor is not None and off_mm is None:
         yield Grade.USABLE, "scale unchecked: it rests on the marker's sides alone; measure the spots, --apart_mm"
@@ -81,6 +84,26 @@ def _graded(room: Room) -> Iterator[tuple[Grade, str]]:
             f"scale: the first two spots came out {abs(off_mm):.1f} mm too {'far apart' if off_mm > 0 else 'close'}, "
             f"at most {scale_tolerance_mm(room):.1f} mm: the marker's sides in the config are {abs(percent):.1f} % too "
             f"{'long' if off_mm > 0 else 'short'}, or --apart_mm is wrong",
+        )
+
+
+def _of_board(lying: Lying | None) -> Iterator[tuple[Grade, str]]:
+    if lying is None:
+        return
+    yield (
+        _grade(lying.rms_px, GOOD_PX, USABLE_PX),
+        f"the board's corners miss by {lying.rms_px:.2f} px, good is {GOOD_PX:g} px: it moved, is not flat, or "
+        "--corners are not its own",
+    )
+    if lying.larger is None:
+        yield Grade.USABLE, "scale unchecked: one camera alone saw the board; lay it where two see it"
+    elif abs(lying.larger) > SURE * lying.larger_sigma:
+        large, long = ("large", "long") if lying.larger > 0.0 else ("small", "short")
+        yield (
+            Grade.NOT_GOOD,
+            f"scale: the board came out {abs(100 * lying.larger):.2f} % too {large}, at most "
+            f"{100 * SURE * lying.larger_sigma:.2f} %: the marker's sides in the config are as much too {long}, or "
+            "--square_mm is wrong: measure both",
         )
 
 
@@ -156,9 +179,28 @@ def _of_side(side: Side) -> Iterator[tuple[Grade, str]]:
         )
 
 
+def _of_sizes(sizes: tuple[Size, ...]) -> Iterator[tuple[Grade, str]]:
+    """Doubt the radius of all balls, or else of single ones: it moves no centre, but such balls are found less well."""
+    every = together(sizes)
+    alike = all(abs(size.off_mm - every.off_mm) <= SURE * size.sigma_mm for size in sizes)
+    for size in (every,) if alike else sizes:
+        if _is_off(size):
+            yield (
+                Grade.USABLE,
+                f"ball radius: {', '.join(size.names)} measured {size.found_mm:.2f} +- {size.sigma_mm:.2f} mm, config "
+                f"says {size.said_mm:.2f} mm: measure across with a caliper, correct radius_mm in [[marker.balls]]",
+            )
+
+
+def _is_off(size: Size) -> bool:
+    return abs(size.off_mm) > SURE * size.sigma_mm
+
+
 def _notes(room: Room) -> Iterator[str]:
-    if room.floor is None:
-        yield "tilt, heading and origin are those of the config's cameras; --frame spots measures them"
+    if room.lying is not None:
+        yield "the floor under the board is taken for level"
+    elif room.floor is None:
+        yield "tilt, heading and origin are those of the config's cameras; --frame spots or board measures them"
     else:
         yield (
             f"the three spots are taken for level; on them the marker leans {room.floor.lean_deg:.1f} deg, which a "

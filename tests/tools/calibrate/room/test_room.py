@@ -10,18 +10,23 @@ import numpy as np
 import pytest
 
 from bridge.settings import RigOrigin, load_settings, rig_of
-from tests.tools.calibrate.room.waved import watched
+from tests.tools.calibrate.room.test_lying import FLOOR, CORNER_inW, stills
 from tests.tracker.paper_rig import paper_rig
+from tests.tracker.rigs import ring_rig
+from tools.bench.waved import watched
 from tools.calibrate.grade import Grade
 from tools.calibrate.room.bundle import zoomed
 from tools.calibrate.room.file import Record, with_room
 from tools.calibrate.room.footage import Footage
 from tools.calibrate.room.inspect import inspect
+from tools.calibrate.room.radius import measured_sizes
 from tools.calibrate.room.report import to_json, to_text
 from tools.calibrate.room.room import Room, Terms, calibrate_room
-from tools.calibrate.room.spots import Stand, floor_of
+from tools.calibrate.room.sides import Side, refuse_swapped
+from tools.calibrate.room.spots import Stand, find_stands, floor_of
 from tools.calibrate.room.tracks import Track
 from tools.calibrate.room.verdict import judge
+from tools.calibrate.room.worth import worth_of
 from tools.cli import run_command_line
 from tracker.errors import OperatorError
 from tracker.maths import so3
@@ -32,6 +37,7 @@ from tracker.types import Array, frozen_array
 
 TERMS = Terms(True, SPOTS_inW[0], APART_M, np.array([1.2, 0.8, 0.8]), lenses=False)
 LAB = (Path(__file__).parents[4] / "config" / "lab.toml").read_text(encoding="utf-8")
+ADA = Record("2026-01-31", "Ada", "camera:0,1", "spots")
 CAMERAS_inW = np.array([[1.6, 1.6, 2.2], [-1.6, -1.6, 2.2]])
 
 
@@ -56,10 +62,34 @@ def test_three_spots_put_the_cameras_where_they_are_in_the_room_and_the_verdict_
     for camera, truth in zip(room.cameras, paper_rig().cameras, strict=True):
         assert np.linalg.norm(camera.p_CinW - truth.p_CinW) < 0.006
         assert np.degrees(np.linalg.norm(so3.log(truth.R_CtoW.T @ camera.R_CtoW))) < 0.15
+    assert room.floor_sigmas is not None
+    turns = [
+        so3.log(found.R_CtoW @ truth.R_CtoW.T) for found, truth in zip(room.cameras, paper_rig().cameras, strict=True)
+    ]
+    tilt_x, tilt_y, heading = np.abs(np.degrees(np.mean(turns, axis=0))).tolist()
+    assert max(tilt_x, tilt_y) < 3.0 * room.floor_sigmas.tilt_deg < 0.1
+    assert heading < 3.0 * room.floor_sigmas.heading_deg < 0.1
     verdict = judge(room)
     assert (verdict.grade, verdict.against) == (Grade.GOOD, ())
     assert to_text(room, verdict).splitlines()[-1].startswith("Good: points are known to ")
     assert json.loads(to_json(room, verdict))["grade"] == "good"
+
+
+def test_a_board_on_the_floor_stands_in_for_the_spots(footage: tuple[Rig, Footage]) -> None:
+    rig, seen = footage
+    cameras = paper_rig().cameras
+    lain = replace(seen, stills=tuple(stills(cameras, (0, 1))))
+    room = calibrate_room(lain, rig, replace(TERMS, by_spots=False, board=FLOOR, origin_m=CORNER_inW, apart_m=None))
+    for camera, truth in zip(room.cameras, cameras, strict=True):
+        assert np.linalg.norm(camera.p_CinW - truth.p_CinW) < 0.010
+        assert np.degrees(np.linalg.norm(so3.log(truth.R_CtoW.T @ camera.R_CtoW))) < 0.2
+    verdict = judge(room)
+    assert verdict.grade is Grade.GOOD
+    assert "frame: board seen by cam" in to_text(room, verdict)
+    assert len(json.loads(to_json(room, verdict))["board"]["cameras"]) == 2
+    assert room.lying is not None
+    doubled = replace(room, lying=replace(room.lying, larger=0.01, larger_sigma=0.002))
+    assert any("the board came out 1.00 % too large" in reason for reason in judge(doubled).against)
 
 
 def test_a_distance_that_is_not_what_the_tape_says_is_told_in_millimetres(room: Room) -> None:
@@ -88,6 +118,32 @@ def test_a_marker_built_otherwise_than_the_config_says_is_named_with_its_length(
     assert any(reason.startswith("marker: yellow to green is 16") for reason in verdict.against)
 
 
+def test_balls_that_are_swapped_are_named_where_the_sides_tell(footage: tuple[Rig, Footage]) -> None:
+    rig, _ = footage
+    told = [Side(("a", "b"), 0.0, side_mm, 0.1) for side_mm in (140.0, 166.5, 157.9)]
+    places = np.array([[0.06, -0.046, 0.0], [0.0, 0.1, 0.0], [-0.08, -0.046, 0.0]])
+    with pytest.raises(OperatorError, match="yellow is where it has orange, green is where it has yellow, orange is"):
+        refuse_swapped(tuple(told), with_places(rig, places))
+    refuse_swapped(tuple(told), with_places(rig, places[[2, 0, 1]]))
+
+
+@pytest.mark.parametrize("share", [0.95, 1.05])
+def test_a_ball_radius_of_the_config_that_is_wrong_is_told(footage: tuple[Rig, Footage], share: float) -> None:
+    rig, seen = footage
+    balls = tuple(replace(ball, radius_m=share * ball.radius_m) for ball in rig.marker.balls)
+    sizes = measured_sizes(seen, make_rig(paper_rig().cameras, make_marker(balls)))
+    for size, truth in zip(sizes, rig.marker.balls, strict=True):
+        assert abs(size.found_mm - 1e3 * truth.radius_m) < 3.0 * size.sigma_mm
+        assert size.sigma_mm < 0.01 * size.found_mm
+
+
+def test_a_wrong_radius_is_told_once_for_all_balls_and_a_single_one_by_its_name(room: Room) -> None:
+    wrong = [replace(size, said_mm=1.05 * size.found_mm) for size in room.sizes]
+    for sizes, names in ((wrong, "yellow, green, orange"), ([room.sizes[0], wrong[1], room.sizes[2]], "green")):
+        (doubt,) = judge(replace(room, sizes=tuple(sizes))).doubts
+        assert doubt.startswith(f"ball radius: {names} measured 7.")
+
+
 def test_refined_lenses_come_nearer_to_the_true_ones(footage: tuple[Rig, Footage]) -> None:
     rig, seen = footage
     longer = tuple(zoomed(camera, 1.004, (0.0, 0.0)) for camera in rig.cameras)
@@ -98,7 +154,7 @@ def test_refined_lenses_come_nearer_to_the_true_ones(footage: tuple[Rig, Footage
 
 def test_the_room_file_is_the_config_with_measured_cameras_and_runs(room: Room, tmp_path: Path) -> None:
     path = tmp_path / "room.toml"
-    text = with_room(LAB, room, judge(room), Record("2026-01-31", "Ada", "camera:0,1", "spots"))
+    text = with_room(LAB, room.cameras, worth_of(room, judge(room)), ADA)
     path.write_text(text, encoding="utf-8")
     settings = load_settings(path)
     chosen = rig_of(settings, paper_rig().cameras)
@@ -110,11 +166,23 @@ def test_the_room_file_is_the_config_with_measured_cameras_and_runs(room: Room, 
     assert (settings.rig.measured.by, settings.rig.measured.verdict) == ("Ada", "good")
     assert "# Fix exposure, white balance and focus" in text
     assert "Nominal cameras" not in text
-    assert with_room(text, room, judge(room), Record("2026-01-31", "Ada", "camera:0,1", "spots")) == text
+    assert with_room(text, room.cameras, worth_of(room, judge(room)), ADA) == text
 
 
 def stands(places: list[tuple[float, float, float]], up: tuple[float, float, float] = (0.0, 0.0, 1.0)) -> list[Stand]:
-    return [Stand(float(k), k + 2.0, np.array(place), np.array(up)) for k, place in enumerate(places)]
+    unseen = np.full((2, 3, 2), np.nan)
+    return [Stand(float(k), k + 2.0, np.array(place), np.array(up), unseen) for k, place in enumerate(places)]
+
+
+def test_a_camera_that_sees_the_vehicle_come_but_not_stand_does_not_put_the_spot_aside() -> None:
+    rig, t_s = ring_rig(3), np.arange(0.0, 4.0, 1.0 / 15.0)
+    places_m = np.outer(np.minimum(t_s - 1.0, 0.0), [0.3, 0.3, 0.0])  # it comes for a second, then it stands
+    balls_inW = places_m[:, None] + rig.marker.points_inB
+    uv_px = [camera.project(balls_inW.reshape(-1, 3))[0].reshape(-1, 3, 2) for camera in rig.cameras]
+    seen = [len(t_s), len(t_s), 15]
+    tracks = [Track(t_s[:n], uv[:n], np.full((n, 3), 0.1)) for n, uv in zip(seen, uv_px, strict=True)]
+    (stand,) = find_stands(tracks, np.zeros(3), rig.cameras, rig)
+    np.testing.assert_allclose(stand.p_BinW, np.zeros(3), atol=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -165,7 +233,7 @@ def test_footage_that_tells_no_room_is_refused_before_anything_is_solved(
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (["--frame", "floor"], "--frame 'floor': unknown; known: spots, config"),
+        (["--frame", "floor"], "--frame 'floor': unknown; known: spots, board, config"),
         (["--apart_mm", "0.8"], "--apart_mm 0.8 mm: must be 100 to 20000 mm"),
         (["--origin_mm", "0,0"], "--origin_mm '0,0': must be three millimetres"),
         (["--seconds", "1"], "--seconds 1 s: must be 5 to 600 s"),

@@ -8,23 +8,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.tools.calibrate.room.waved import watched
 from tests.tracker.paper_rig import paper_rig
 from tests.tracker.rigs import ring_rig
+from tools.bench.calibration import errors_of
+from tools.bench.waved import misplaced, watched
 from tools.calibrate.room.bundle import stepped
 from tools.calibrate.room.certainty import camera_covariance
 from tools.calibrate.room.footage import watch
 from tools.calibrate.room.gauge import aligned
 from tools.calibrate.room.jacobian import CAMERA, Layout, residuals, slopes
 from tools.calibrate.room.rigid import rigid
-from tools.calibrate.room.scene import Scene, Seen
-from tools.calibrate.room.solve import Found, find_cameras
+from tools.calibrate.room.scene import Scene, Seen, common_instants
+from tools.calibrate.room.solve import find_cameras, refined
+from tools.calibrate.room.start import first_scene
 from tools.calibrate.room.tracks import Track
 from tracker.errors import OperatorError
 from tracker.maths import so3
-from tracker.rig import Rig
+from tracker.rig import Rig, make_rig
 from tracker.scene import Look
-from tracker.types import Array
+from tracker.sources.waving import waved
 
 
 def _scene(rig: Rig, instants: int, rng: np.random.Generator) -> tuple[Scene, Seen]:
@@ -44,13 +46,6 @@ def _scene(rig: Rig, instants: int, rng: np.random.Generator) -> tuple[Scene, Se
     return scene, seen
 
 
-def _errors(found: Found, true: Rig) -> tuple[Array, Array]:
-    """Return each camera's error in place (n, 3) [m] and turn (n, 3) [rad], all cameras' common one taken off."""
-    pairs = list(zip(aligned(found.scene, true.cameras).cameras, true.cameras, strict=True))
-    turns = np.array([so3.log(truth.R_CtoW.T @ camera.R_CtoW) for camera, truth in pairs])
-    return np.array([camera.p_CinW - truth.p_CinW for camera, truth in pairs]), turns
-
-
 @pytest.mark.parametrize(
     ("cameras", "seed", "look"),
     [(2, 1, Look()), (2, 5, Look()), (2, 6, Look(jpeg_quality=90)), (3, 2, Look()), (4, 1, Look(jpeg_quality=90))],
@@ -62,7 +57,7 @@ def test_misplaced_cameras_are_found_again_within_what_is_said_of_them_and_so_ar
     late_ns = (0, 8_000_000, -5_000_000, 3_000_000)[:cameras]
     said, footage = watched(true, seed, look, 20.0, late_ns)
     found = find_cameras(footage, said)
-    off_m, off_rad = _errors(found, true)
+    off_m, off_rad = errors_of(found, true)
     off_s = np.array([camera.clock_offset_ns for camera in found.cameras]) * 1e-9 - np.array(late_ns) * 1e-9
     if not look.jpeg_quality:  # JPEG draws the balls inwards: docs/room.md says by how much rooms miss it
         assert np.linalg.norm(off_m, axis=1).max() < 0.002
@@ -72,6 +67,32 @@ def test_misplaced_cameras_are_found_again_within_what_is_said_of_them_and_so_ar
     assert (np.linalg.norm(off_m, axis=1) < 3.0 * np.linalg.norm(sigmas[:, :3], axis=1)).all()
     assert (np.linalg.norm(off_rad, axis=1) < 3.0 * np.linalg.norm(sigmas[:, 3:6], axis=1)).all()
     assert (np.abs(off_s[1:]) < 4.0 * sigmas[1:, 6]).all()
+
+
+def drawn_track(rig: Rig, c: int, late_s: float, rng: np.random.Generator) -> Track:
+    """Return what one camera sees of the waved marker at 15 Hz for 20 s, with noise, its clock being late."""
+    t_s = np.arange(300) / 15.0
+    p, R = (np.stack(values) for values in zip(*map(waved(3), (t_s + late_s).tolist()), strict=True))
+    balls_inW = rig.marker.points_inB @ np.swapaxes(R, 1, 2) + p[:, None, :]
+    uv_px = rig.cameras[c].project(balls_inW.reshape(-1, 3))[0].reshape(-1, len(rig.marker), 2)
+    within = np.array([all(rig.cameras[c].sees(uv) for uv in balls) for balls in uv_px])
+    noisy = uv_px[within] + rng.normal(scale=0.05, size=uv_px[within].shape)
+    return Track(t_s[within], noisy, np.full(noisy.shape[:2], 0.05))
+
+
+def test_eight_cameras_are_found_together() -> None:
+    true, rng = ring_rig(8), np.random.default_rng(8)
+    late_s = np.append(0.0, rng.uniform(-0.012, 0.012, 7))
+    tracks = [drawn_track(true, c, late, rng) for c, late in enumerate(late_s.tolist())]
+    seen = common_instants(tracks, 200, np.zeros(8))
+    said = make_rig(tuple(misplaced(camera, rng) for camera in true.cameras), true.marker)
+    scene, seen = first_scene(seen, said)
+    found = refined(tracks, seen.t_s, scene, said)
+    off_m, off_rad = errors_of(found, true)
+    assert np.linalg.norm(off_m, axis=1).max() < 0.002
+    assert np.linalg.norm(off_rad, axis=1).max() < math.radians(0.05)
+    off_s = np.array([camera.clock_offset_ns for camera in found.cameras]) * 1e-9 - late_s
+    assert np.abs(off_s).max() < 0.0005
 
 
 def test_a_camera_that_shares_too_little_is_named() -> None:
