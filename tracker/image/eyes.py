@@ -17,7 +17,7 @@ from tracker.state import State
 from tracker.types import Frame
 
 LIGHT_BALLS = 2  # a single ball that is something else would tell of a light that is not there
-LEARN_ALL = 36  # balls of each camera under its gamma; then
+LEARN_ALL = 108  # balls of each camera under its gamma; then
 LEARN_EVERY = 4  # rounds one ball
 BLIND_PX = 0.5  # of the streak's sigma: how fast the balls move is not known
 SMEAR_DOUBT = 0.1  # of an unknown smear: what it moves the centre of a shaded ball, one sigma

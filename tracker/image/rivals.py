@@ -24,8 +24,8 @@ GAMMAS = (1.0, 1.6, 2.2)
 MOST_GAMMA, BEYOND = 2.8, 0.3  # where the highest is the best, rivals this far on either side of it are next
 SEARCHING, FOUND, AT_THE_END = 0.3, 0.12, 0.04
 """One sigma of a gamma: of the best rival, of one that three told, and of 1, where the range ends."""
-ROUND_BALLS, LONG_ROUND_BALLS = 36, 108  # balls that a set of rivals learns from before it is judged: the long round
-CLEAR = 0.2  # where their misfits' logarithms differ by less than this; by chance it is about 0.05
+ROUND_BALLS, LONG_ROUND_BALLS = 54, 90  # balls that a set of rivals learns from before it is judged: the long round
+CLEAR = 0.25  # where their misfits' logarithms differ by less than this; by chance it is about 0.05
 FIRST_LESSONS, FIRST_BALLS = 4, 12
 FORGETTING = 0.94  # a ball: what the light was when it was still being learned counts little
 

@@ -19,6 +19,7 @@ from tracker.start.acquire import first_state
 from tracker.types import Frame, Rejected
 
 YELLOW, GREEN, ORANGE = range(3)
+GOOD_M = 0.15e-3  # the mean error asked of a recording without blur
 CASTS: list[Casts] = [
     {0: (1.2, 0.8, 1.2)},
     {0: (0.8, 1.2, 0.8)},
@@ -56,17 +57,15 @@ def test_the_marker_is_found_by_its_shape_in_nearly_every_instant(look: Look | N
 
 
 @pytest.mark.parametrize("casts", CASTS)
-def test_under_a_cast_of_a_fifth_or_half_the_light_the_learned_colours_track_as_well_as_before(casts: Casts) -> None:
+def test_under_a_cast_of_a_fifth_or_half_the_light_the_learned_colours_track_as_well_as_any(casts: Casts) -> None:
     palette = learn(cast(flown(), casts), RIG, TUNING)
     assert right(palette) >= 0.9
     reasons = " ".join(reason for ball in judge(palette).against for reason in ball)
     # Where one camera's yellow comes near the other's orange no box does, and the verdict must say so.
     assert holds_the_balls(palette) or "set one white balance" in reasons
-    flight = flown(count=12, step=1)
-    before = tracked(flight, RIG)
-    after = tracked(cast(flight, casts), palette.rig)
-    assert before[0] == after[0] == 12
-    assert after[1] < 1.5 * before[1]
+    estimates, error_m = tracked(cast(flown(count=40, step=1), casts), palette.rig)
+    assert estimates == 40
+    assert error_m < GOOD_M
 
 
 def test_the_configured_colours_do_not_hold_the_balls_under_that_cast() -> None:
