@@ -51,7 +51,8 @@ from tracker.types import (
     frozen_array,
 )
 
-ALONE_NS = 100_000_000  # one ball tells a place and no attitude: longer than this it carries no track
+POSED = 3  # sightings that make a pose; fewer fit a mistake as well
+POSED_NS = 100_000_000  # longer than this fewer carry no track
 NO_BREAKS: Mapping[int, float] = MappingProxyType({})
 
 
@@ -78,7 +79,7 @@ class Tracker:
         self._watch = CalibrationWatch(rig, tuning.process.pixel_noise_px)
         self._moved_px = np.zeros(len(rig.cameras))
         self._anew = False
-        self._seen_ns = [-(2**63)] * len(rig.marker)
+        self._seen_ns: dict[tuple[int, int], int] = {}  # by camera and ball
         self._sent_ns = -(2**63)
 
     def step(self, event: Event) -> Step:
@@ -153,7 +154,7 @@ class Tracker:
         before = self._history.newest
         known, self._anew = self._track is TrackState.TRACKING and not self._anew, False
         found = self._follow(frames, t_ns, harvest) if known else None
-        if found is not None and self._carried_by_one(found):
+        if found is not None and self._hardly_seen(found):
             found, self._track = None, TrackState.LOST
         if before is None or t_ns >= before.t_ns:
             few = found is None or 2 * len(found.used) < len(frames) * len(self._rig.marker)
@@ -234,12 +235,14 @@ class Tracker:
         guess = first_guess(self._still_known(start), self._tuning.process)
         return self._study(tuple(frame for frame, _ in seen.values()), guess, harvest, None)
 
-    def _carried_by_one(self, found: Update) -> bool:
-        """Say whether for a while no more than one ball was seen: what seems another is then soon a mistake."""
+    def _hardly_seen(self, found: Update) -> bool:
+        """Say whether for a while fewer sightings were made than make a pose: what seems another is soon a mistake."""
         for sighting in found.used:
-            self._seen_ns[sighting.ball] = max(self._seen_ns[sighting.ball], sighting.t_ns)
-        newest_ns = max(self._seen_ns)
-        return sum(newest_ns - seen_ns <= ALONE_NS for seen_ns in self._seen_ns) < 2
+            place = sighting.camera, sighting.ball
+            self._seen_ns[place] = max(self._seen_ns.get(place, sighting.t_ns), sighting.t_ns)
+        newest_ns = max(self._seen_ns.values())
+        lately = [place for place, seen_ns in self._seen_ns.items() if newest_ns - seen_ns <= POSED_NS]
+        return len(lately) < POSED or len({ball for _, ball in lately}) < 2
 
     def _still_known(self, start: State) -> State:
         """Return a first guess with what the last track learned of the cameras: their noise and their clocks."""
