@@ -15,7 +15,7 @@ from tracker.types import Array
 PLANE = 3  # terms of the background
 TUKEY = 4.685  # of the robust sigma: 95 % efficient where all is well (Huber, Ronchetti, "Robust Statistics", 2009)
 LEAST_WEIGHT = 1e-3
-LEAST_MISFIT = 0.3
+LEAST_MISFIT = 0.3  # a fit is surer where less noise is seen than was allowed for, as far as this
 ITERATIONS = 5
 LATTICE = 8  # places per pixel where a ball is linearised
 FARTHEST_PX = 1.5  # a centre further from the middle pixel has run away
@@ -41,19 +41,8 @@ def draw_at(
     """
     p = fine.shape[2]
     m = p + PLANE
-    read(
-        fine,
-        made,
-        ball,
-        variance,
-        u,
-        v,
-        pixels,
-        drawn[:p],
-        drawn[m : m + p],
-        drawn[m + p : m + 2 * p],
-        drawn[m + 2 * p :],
-    )
+    by_u, by_v, by_variance = drawn[m : m + p], drawn[m + p : m + 2 * p], drawn[m + 2 * p :]
+    read(fine, made, ball, variance, u, v, pixels, drawn[:p], by_u, by_v, by_variance)
     for i in range(pixels.shape[1]):
         bare = 1.0 - drawn[0, i]
         drawn[p, i] = bare
@@ -170,16 +159,23 @@ def _linearise(pixels: Array, drawn: Array, tukey: Array, work: Array, squares: 
         _add_channel(pixels, drawn, weight, work[:m], channel, factor, c, rows, T, squares, normal)
 
 
-@compiled("f8(f8[::1], f8[::1], i8, i8, f8[::1])")
-def _misfit(squares: Array, tukey: Array, channels: int, shapes: int, normal: Array) -> float:
-    """Return chi2 per degree of freedom of brightness or colour, and weaken normal (5,) where it is above 1."""
-    freedom, total = -float(channels * (shapes + PLANE)), 0.0
+@compiled("UniTuple(f8, 2)(f8[::1], f8[::1], i8, i8, f8[::1])")
+def _misfit(squares: Array, tukey: Array, channels: int, shapes: int, normal: Array) -> tuple[float, float]:
+    """Return chi2 per degree of freedom of brightness or colour, and the noise that normal (5,) is weakened for.
+
+    That is no less than 1, unless all pixels leave less, those too that the fit did not believe.
+    """
+    least = -float(channels * (shapes + PLANE))
+    freedom, total, pixels, everything = least, 0.0, least, 0.0
     for i in range(len(squares)):
         freedom += channels * tukey[i] ** 2
         total += squares[i] * tukey[i] ** 2
+        pixels += channels
+        everything += squares[i]
     misfit = total / max(1.0, freedom)
-    normal /= max(LEAST_MISFIT, misfit)
-    return misfit
+    noise = max(misfit, min(1.0, max(LEAST_MISFIT, everything / max(1.0, pixels))))
+    normal /= noise
+    return misfit, noise
 
 
 @compiled("f8(f8[::1], i8)")
@@ -221,6 +217,7 @@ def gauss_newton(
     tukey_c, squares_c, normal_c = np.ones(n_colour), np.empty(n_colour), np.empty(NORMAL)
     octants, normal = np.zeros((OCTANTS, NORMAL)), np.empty(NORMAL)
     misfit_b = misfit_c = at_u = at_v = 0.0
+    noise_b = noise_c = 1.0
     drawn_u = drawn_v = np.inf  # where the ball is drawn: nowhere yet
     for iteration in range(ITERATIONS):
         at_u, at_v = on_lattice(u), on_lattice(v)
@@ -230,8 +227,8 @@ def gauss_newton(
             drawn_u, drawn_v = at_u, at_v
         _linearise(bright, drawn_b, tukey_b, work_b, squares_b, normal_b)
         _linearise(colour, drawn_c, tukey_c, work_c, squares_c, normal_c)
-        misfit_b = _misfit(squares_b, tukey_b, 1, p, normal_b)
-        misfit_c = _misfit(squares_c, tukey_c, 2, p, normal_c)
+        misfit_b, noise_b = _misfit(squares_b, tukey_b, 1, p, normal_b)
+        misfit_c, noise_c = _misfit(squares_c, tukey_c, 2, p, normal_c)
         normal[:] = normal_b + normal_c
         det = normal[0] * normal[2] - normal[1] * normal[1]
         new_u = at_u + min(1.0, max(-1.0, (normal[2] * normal[3] - normal[1] * normal[4]) / det))
@@ -244,8 +241,8 @@ def gauss_newton(
             _doubt(squares_b, 1, tukey_b)
             _doubt(squares_c, 2, tukey_c)
     fit[0], fit[1] = u, v
-    add_octants(bright, work_b[p + PLANE + 1 :], at_u, at_v, 1.0 / max(LEAST_MISFIT, misfit_b), octants)
-    add_octants(colour, work_c[p + PLANE + 1 :], at_u, at_v, 1.0 / max(LEAST_MISFIT, misfit_c), octants)
+    add_octants(bright, work_b[p + PLANE + 1 :], at_u, at_v, 1.0 / noise_b, octants)
+    add_octants(colour, work_c[p + PLANE + 1 :], at_u, at_v, 1.0 / noise_c, octants)
     doubted_covariance(normal, disagreement(normal_b, normal_c), octants, u - at_u, v - at_v, fit[2:5])
     fit[5] = (misfit_b * n_bright + misfit_c * 2 * n_colour) / (n_bright + 2 * n_colour)
 
