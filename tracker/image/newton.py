@@ -15,7 +15,7 @@ from tracker.types import Array
 PLANE = 3  # terms of the background
 TUKEY = 4.685  # of the robust sigma: 95 % efficient where all is well (Huber, Ronchetti, "Robust Statistics", 2009)
 LEAST_WEIGHT = 1e-3
-LEAST_MISFIT = 0.3  # a fit is surer where less noise is seen than was allowed for, as far as this
+LEAST_MISFIT = 0.4  # a fit is surer where less noise is seen than was allowed for, as far as this
 ITERATIONS = 5
 LATTICE = 8  # places per pixel where a ball is linearised
 FARTHEST_PX = 1.5  # a centre further from the middle pixel has run away
