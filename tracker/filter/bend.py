@@ -33,14 +33,14 @@ def _open_directions(P: Array, arm_m: float) -> Array:
     return found
 
 
-@compiled("f8[::1](f8[::1], f8[::1], i8, f8, i8[::1], i8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")
+@compiled("f8[::1](f8[::1], f8[::1], f8[::1], i8, f8, i8[::1], i8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")
 def _curve(
-    mean: Array, way: Array, size: int, T: float, cameras: Indices, balls: Indices, lags_s: Array, table: Array,
-    points_inB: Array,
+    mean: Array, uv: Array, way: Array, size: int, T: float, cameras: Indices, balls: Indices, lags_s: Array,
+    table: Array, points_inB: Array,
 ) -> Array:  # fmt: skip
-    """Return the pixels' second derivative (2n,) along an error of the pose (6,), by differences over it."""
+    """Return the second derivative (2n,) of the pixels uv (2n,) along an error of the pose (6,), by differences."""
     E, J_r, step = np.empty((3, 3)), np.empty((3, 3)), np.zeros(size)
-    found = -2.0 * pixels(mean, T, cameras, balls, lags_s, table, points_inB)[0]
+    found = -2.0 * uv
     for sign in (-1.0, 1.0):
         step[:POSE] = sign * way
         found += pixels(moved(mean, step, E, J_r), T, cameras, balls, lags_s, table, points_inB)[0]
@@ -67,13 +67,14 @@ def bend_noise(
     ways = _open_directions(P, math.sqrt((points_inB**2).sum() / len(points_inB)))
     E, J_r = np.empty((3, 3)), np.empty((3, 3))
     here = moved(mean, dx, E, J_r)
+    uv = pixels(here, T, cameras, balls, lags_s, table, points_inB)[0]
     noise, middle, own = np.zeros((n, n)), np.zeros(n), np.empty((OPEN, n))
     for a in range(OPEN):
-        own[a] = _curve(here, ways[a], size, T, cameras, balls, lags_s, table, points_inB)
+        own[a] = _curve(here, uv, ways[a], size, T, cameras, balls, lags_s, table, points_inB)
         noise += np.outer(own[a], own[a]) / 2.0
         middle += own[a] / 2.0
         for b in range(a):
-            both = _curve(here, ways[a] + ways[b], size, T, cameras, balls, lags_s, table, points_inB)
+            both = _curve(here, uv, ways[a] + ways[b], size, T, cameras, balls, lags_s, table, points_inB)
             D = (both - own[a] - own[b]) / 2.0
             noise += np.outer(D, D)
     return noise + np.outer(middle, middle)
