@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from tracker.image.album import Album
 from tracker.image.appearance import MISFIT_MAX
-from tracker.image.look import Fitted, Look, look_near
+from tracker.image.look import Fitted, Look, gaze_of, look_near
 from tracker.image.rivals import first_rivals
 from tracker.image.sight import MISFIT
 from tracker.image.tint import Bgr, Gains, Tint, core_colour
@@ -41,8 +41,10 @@ class Eyes:
 
     def _sum_up(self) -> None:
         """Take note of what is known by now: asked for in every round, it changes with lessons alone."""
-        self._appearances = [rivals.best for rivals in self._rivals]
-        self._exposures_s = tuple([appearance.response.exposure_s for appearance in self._appearances])
+        appearances = [rivals.best for rivals in self._rivals]
+        looks = zip(appearances, self._albums, self._tints, strict=True)
+        self._gazes = [gaze_of(self._rig, appearance, album, tint.gains) for appearance, album, tint in looks]
+        self._exposures_s = tuple([appearance.response.exposure_s for appearance in appearances])
         self.doubts_px = tuple([rivals.doubt_px for rivals in self._rivals])
         self._gamma_known = all(rivals.settled for rivals in self._rivals)
         enough = all(rivals.count >= LEARN_ALL for rivals in self._rivals)
@@ -73,14 +75,22 @@ class Eyes:
 
     def suppose(self, gains: Sequence[Gains]) -> None:
         """Take the light in each camera to be so."""
-        self._tints = [replace(tint, gains=one) for tint, one in zip(self._tints, gains, strict=True)]
+        for index, one in enumerate(gains):
+            self._light_up(index, replace(self._tints[index], gains=one))
+
+    def _light_up(self, index: int, tint: Tint) -> None:
+        """Take the light in one camera to be so; the colours looked for change in few, large steps."""
+        before, self._tints[index] = self._tints[index].gains.undoing, tint
+        if tint.gains.undoing != before:
+            gaze = self._gazes[index]
+            self._gazes[index] = gaze_of(self._rig, gaze.appearance, gaze.album, tint.gains)
 
     def look(self, frames: Sequence[Frame], state: State) -> Look:
         """Find each ball in each image where a state expects it."""
         whose = frames[self._turn % len(frames)].camera  # of those that see now: free-running ones are a round each
         for index, album in enumerate(self._albums):
             album.draws_left = int(index == whose) if self._settled else None
-        look = look_near(frames, self._rig, state, self._appearances, self._albums, self.gains)
+        look = look_near(frames, self._rig, state, self._gazes)
         smear_px = self._smear_px(state)
         look.blind = smear_px > BLIND_PX
         return look.doubted(SMEAR_DOUBT * smear_px) if look.blind else look
@@ -124,7 +134,8 @@ class Eyes:
         for camera in cameras:
             seen = [one for one in fitted if one.frame.camera == camera and float(one.fit[MISFIT]) <= MISFIT_MAX]
             if len(seen) >= LIGHT_BALLS:
-                self._tints[camera] = self._tints[camera].learned([(one.sighting.ball, _colour(one)) for one in seen])
+                colours = [(one.sighting.ball, _colour(one)) for one in seen]
+                self._light_up(camera, self._tints[camera].learned(colours))
 
 
 def _colour(one: Fitted) -> Bgr:
