@@ -20,7 +20,6 @@ import numpy as np
 from filterpy.kalman import KalmanFilter
 
 from tracker.filter.batch import Batch, make_batch
-from tracker.filter.clocks import taught
 from tracker.filter.correction import inverse_of
 from tracker.filter.fit import Fit, fit
 from tracker.filter.posterior import settled
@@ -65,11 +64,8 @@ def update(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig, pro
     distances2 = batch.distances2()
     limit = chi2_limit(probability, 2)
     near = [i for i, distance2 in enumerate(distances2) if distance2 <= limit]
-    rejected = [
-        _left_out(sightings[i], rig, distance2, "from the prediction")
-        for i, distance2 in enumerate(distances2)
-        if not distance2 <= limit
-    ]
+    far = sorted({*range(len(sightings))}.difference(near)) if len(near) < len(sightings) else []
+    rejected = [_left_out(sightings[i], rig, distances2[i], "from the prediction") for i in far]
     if not near:
         return Rejected(Reason.FRAME_GATE, "no sighting near the prediction", ahead.state.t_ns)
     batch = batch.part(near)
@@ -136,8 +132,9 @@ def _posterior(ahead: Prediction, best: Fit) -> State:
     prior, step = ahead.state, _linear_step(len(best.P), get_ident())
     step.x, step.P = np.zeros((len(best.P), 1)), best.P
     step.update(best.y[:, None], best.R, best.H)
-    dx, P_after = taught(prior.mean, best.P, ahead.dt, best.H, best.dx, step.P)
-    mean, P, noise = settled(prior.mean, dx, P_after, prior.noise, best.batch.cameras, best.u, best.inverse)
+    mean, P, noise = settled(
+        prior.mean, best.P, ahead.dt, best.H, best.dx, step.P, prior.noise, best.batch.cameras, best.u, best.inverse
+    )
     return prior.at_mean(prior.t_ns, mean, P, best.levels, noise)
 
 

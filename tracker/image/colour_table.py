@@ -40,15 +40,9 @@ def colours_of(balls: tuple[Ball, ...], gains: Gains = NEUTRAL) -> ColourTable:
     return _in_light(balls, blue, red)
 
 
-def colours_of_each(balls: tuple[Ball, ...], gains: Gains) -> tuple[ColourTable, ...]:
-    """Return a table of each ball's colour alone."""
-    blue, red = gains.undoing
-    return _each_in_light(balls, blue, red)
-
-
-@lru_cache(maxsize=256)
-def _each_in_light(balls: tuple[Ball, ...], blue: int, red: int) -> tuple[ColourTable, ...]:
-    return tuple(_in_light((ball,), blue, red) for ball in balls)
+def colours_of_each(balls: tuple[Ball, ...], undoing: tuple[int, int]) -> tuple[ColourTable, ...]:
+    """Return a table of each ball's colour alone, in a light that is undone so."""
+    return tuple(_in_light((ball,), *undoing) for ball in balls)
 
 
 @lru_cache(maxsize=1024)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from tracker.image.album import Album
-from tracker.image.appearance import MISFIT_MAX
-from tracker.image.look import Fitted, Look, gaze_of, look_near
+from tracker.image.appearance import MISFIT_MAX, Appearance
+from tracker.image.look import Fitted, Gaze, Look, gaze_of, look_near
 from tracker.image.rivals import first_rivals
 from tracker.image.sight import MISFIT
 from tracker.image.tint import Bgr, Gains, Tint, core_colour
@@ -35,6 +35,7 @@ class Eyes:
         self._rivals = [first_rivals() for _ in rig.cameras]
         self._albums = [Album(camera) for camera in rig.cameras]
         self._tints = [Tint() for _ in rig.cameras]
+        self._gazes = [self._gaze(index, rivals.best) for index, rivals in enumerate(self._rivals)]
         self._turn = 0
         self._taught_blindly = False
         self._sum_up()
@@ -42,13 +43,17 @@ class Eyes:
     def _sum_up(self) -> None:
         """Take note of what is known by now: asked for in every round, it changes with lessons alone."""
         appearances = [rivals.best for rivals in self._rivals]
-        looks = zip(appearances, self._albums, self._tints, strict=True)
-        self._gazes = [gaze_of(self._rig, appearance, album, tint.gains) for appearance, album, tint in looks]
+        for index, appearance in enumerate(appearances):
+            if self._gazes[index].appearance is not appearance:
+                self._gazes[index] = self._gaze(index, appearance)
         self._exposures_s = tuple([appearance.response.exposure_s for appearance in appearances])
         self.doubts_px = tuple([rivals.doubt_px for rivals in self._rivals])
         self._gamma_known = all(rivals.settled for rivals in self._rivals)
         enough = all(rivals.count >= LEARN_ALL for rivals in self._rivals)
         self._settled = self._gamma_known and enough  # how balls look is known, so that little is left to learn
+
+    def _gaze(self, index: int, appearance: Appearance) -> Gaze:
+        return gaze_of(self._rig, appearance, self._albums[index], self._tints[index].gains)
 
     def stand(self, rig: Rig) -> None:
         """Take the cameras to stand elsewhere."""
@@ -80,10 +85,9 @@ class Eyes:
 
     def _light_up(self, index: int, tint: Tint) -> None:
         """Take the light in one camera to be so; the colours looked for change in few, large steps."""
-        before, self._tints[index] = self._tints[index].gains.undoing, tint
-        if tint.gains.undoing != before:
-            gaze = self._gazes[index]
-            self._gazes[index] = gaze_of(self._rig, gaze.appearance, gaze.album, tint.gains)
+        self._tints[index], gaze = tint, self._gazes[index]
+        if tint.gains.undoing != gaze.undoing:
+            self._gazes[index] = self._gaze(index, gaze.appearance)
 
     def look(self, frames: Sequence[Frame], state: State) -> Look:
         """Find each ball in each image where a state expects it."""

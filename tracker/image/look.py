@@ -83,17 +83,20 @@ class Gaze:
     """What one camera looks for: balls as they look to it now.
 
     known, colours: of the camera and of each ball, as compiled code takes them.  album: their templates.
+    undoing: the colour of the light that is undone, see `Gains.undoing`.
     """
 
     appearance: Appearance
     known: Known
     colours: tuple[ColourTable, ...]
     album: Album
+    undoing: tuple[int, int]
 
 
 def gaze_of(rig: Rig, appearance: Appearance, album: Album, gains: Gains = NEUTRAL) -> Gaze:
     """Return what a camera looks for to which balls look so, in a light of this colour."""
-    return Gaze(appearance, known_of(appearance.response), colours_of_each(rig.marker.balls, gains), album)
+    undoing = gains.undoing
+    return Gaze(appearance, known_of(appearance.response), colours_of_each(rig.marker.balls, undoing), album, undoing)
 
 
 def look_near(frames: Sequence[Frame], rig: Rig, state: State, gazes: Sequence[Gaze]) -> Look:
