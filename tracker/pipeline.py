@@ -8,7 +8,6 @@ It reads no clock but the stopwatch it is given, and touches no file and no devi
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
@@ -16,12 +15,11 @@ from types import MappingProxyType
 import numpy as np
 
 from tracker.cadence import Cadence
-from tracker.filter.bias import shared_covariance
 from tracker.filter.continuity import Continuity
 from tracker.filter.ekf import Update
 from tracker.filter.history import History
 from tracker.filter.predict import Prediction, first_guess, predict
-from tracker.filter.sag import sag_covariance
+from tracker.filter.reported import reported
 from tracker.harvest import Harvest
 from tracker.health.background import LIMIT_PX
 from tracker.health.mend import SHARE
@@ -35,11 +33,10 @@ from tracker.rig import Rig
 from tracker.rounds import Rounds
 from tracker.standing import Health
 from tracker.start.acquire import Seen, first_state
-from tracker.state import OFFSETS, REPORTED, State
+from tracker.state import OFFSETS, State
 from tracker.study import Round, Study
 from tracker.tuning import Tuning
 from tracker.types import (
-    Array,
     Estimate,
     Event,
     Frame,
@@ -261,17 +258,17 @@ class Tracker:
 
     def _estimate(self, found: Update, available_ns: int, stages: dict[str, int]) -> Estimate:
         state = found.state
-        covariance = state.P[:REPORTED, :REPORTED].copy()
-        covariance[:3, :3] += self._shared(state) + sag_covariance(state)
+        covariance, sigmas_s = reported(state, self._rig, self._eyes.exposure_s, self._eyes.doubts_px, self._moved_px)
+        mean = frozen_array(state.mean)
         return Estimate(
             t_ns=state.t_ns,
-            p_BinW=frozen_array(state.p_BinW),
-            R_BtoW=frozen_array(state.R_BtoW),
-            v_BinW=frozen_array(state.v_BinW),
-            w_BinB=frozen_array(state.w_BinB),
-            covariance=frozen_array(covariance),
-            clock_offsets_s=frozen_array(state.offsets_s),
-            clock_sigmas_s=frozen_array([0.0, *(math.sqrt(v) for v in state.P.diagonal()[OFFSETS:].tolist())]),
+            p_BinW=mean[:3],
+            R_BtoW=mean[3:12].reshape(3, 3),
+            v_BinW=mean[12:15],
+            w_BinB=mean[15:18],
+            covariance=covariance,
+            clock_offsets_s=mean[24:],
+            clock_sigmas_s=sigmas_s,
             state=self._track,
             reset_counter=self._continuity.resets,
             nis=found.nis,
@@ -279,10 +276,6 @@ class Tracker:
             available_ns=available_ns,
             stages_ns=MappingProxyType(stages),
         )
-
-    def _shared(self, state: State) -> Array:
-        doubts_px = np.hypot(self._eyes.doubts_px, self._moved_px)
-        return shared_covariance(state, self._rig, self._eyes.exposure_s, doubts_px)
 
 
 def _late(frame: Frame) -> Rejected:

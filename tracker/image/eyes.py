@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from tracker.image.album import Album
 from tracker.image.appearance import MISFIT_MAX, Appearance
 from tracker.image.look import Fitted, Gaze, Look, gaze_of, look_near
@@ -27,7 +29,7 @@ LONG_STREAK_PX = 0.7  # an image smeared further than this, taken for a still on
 class Eyes:
     """What each camera of a rig knows of how balls look to it.
 
-    doubts_px: by camera, by how much all centres may be wrong together for what is not known, one sigma [px].
+    doubts_px: (cameras,) by how much all centres may be wrong together for what is not known, one sigma [px].
     """
 
     def __init__(self, rig: Rig) -> None:
@@ -47,7 +49,7 @@ class Eyes:
             if self._gazes[index].appearance is not appearance:
                 self._gazes[index] = self._gaze(index, appearance)
         self._exposures_s = tuple([appearance.response.exposure_s for appearance in appearances])
-        self.doubts_px = tuple([rivals.doubt_px for rivals in self._rivals])
+        self.doubts_px = np.array([rivals.doubt_px for rivals in self._rivals])
         self._gamma_known = all(rivals.settled for rivals in self._rivals)
         enough = all(rivals.count >= LEARN_ALL for rivals in self._rivals)
         self._settled = self._gamma_known and enough  # how balls look is known, so that little is left to learn
