@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,8 +19,7 @@ from tracker.state import OFFSETS
 from tracker.types import Array, BallSighting
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Batch:
+class Batch(NamedTuple):
     """Sightings as arrays, and what the prediction says of them.
 
     z (2n,), R (2n, 2n): pixels and the noise of fit and camera.  cameras, balls, lags_s (n,) [s].

@@ -11,10 +11,10 @@ state goes in, a new state comes out.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations
 from threading import get_ident
+from typing import NamedTuple
 
 import numpy as np
 from filterpy.kalman import KalmanFilter
@@ -32,8 +32,7 @@ from tracker.types import BallSighting, Reason, Rejected
 MAX_SUSPECTS = 8
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Update:
+class Update(NamedTuple):
     """An updated state, its NIS and degrees of freedom, what was used and what was left out."""
 
     state: State
@@ -79,7 +78,7 @@ def update(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig, pro
         detail = f"NIS {whole.nis:.0f} with {2 * len(near)} degrees of freedom"
         return Rejected(Reason.FRAME_GATE, detail, ahead.state.t_ns)
     for sighting, gain in zip(batch.sightings, whole.gains() if best is not whole else (), strict=False):
-        if sighting not in best.batch.sightings:
+        if not any(sighting is one for one in best.batch.sightings):
             rejected.append(_left_out(sighting, rig, float(gain), "from what the others say"))
     state = at_origin(_posterior(ahead, best), ahead.pivot_inB)
     return Update(state, best.nis, len(best.u), best.batch.sightings, tuple(rejected))

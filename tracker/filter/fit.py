@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,8 +25,7 @@ LEAST_DOUBT = 0.2  # of the pixels' own noise: less does not matter
 SHORTEST_S = 1e-3  # a tilt measured twice within less tells no more
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Fit:
+class Fit(NamedTuple):
     """A fit of a batch: the error dx found, and what leads there from the prior by one linear update.
 
     P: prior covariance with the manoeuvre's noise in it.  levels: of the manoeuvre, after these sightings.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,8 +20,7 @@ ORIGIN: Array = np.zeros(3)
 OFFSET_WALK = 2e-5  # of a clock offset [s / sqrt s]: crystals drift
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Prediction:
+class Prediction(NamedTuple):
     """A state carried on, before it is known how brisk the manoeuvre was meanwhile.
 
     state: with the covariance that is expected, for who looks for the balls.
@@ -33,7 +32,7 @@ class Prediction:
     P_coasted: Array
     dt: float
     process: Process
-    pivot_inB: Array = field(default_factory=lambda: ORIGIN)
+    pivot_inB: Array = ORIGIN
 
     @property
     def turn_open(self) -> bool:

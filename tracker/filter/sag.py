@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from tracker.filter.measure import Indices
 from tracker.filter.pivot import LEAST_OPEN_TURN_RAD
 from tracker.maths.compiled import compiled
 from tracker.state import State
@@ -58,7 +59,7 @@ def sag(R: Array, P: Array) -> Array:
 
 
 @compiled("f8[:, ::1](f8[:, ::1], i8[::1], f8[:, ::1], f8[::1], f8[:, ::1])")
-def sag_noise(H: Array, balls: Array, points_inB: Array, mean: Array, P: Array) -> Array:
+def sag_noise(H: Array, balls: Indices, points_inB: Array, mean: Array, P: Array) -> Array:
     """Return the covariance (2n, 2n) [px^2] of what that turn does to sightings beyond first order.
 
     H: (2n, size) slope of the sightings.  balls: (n,).  points_inB: (balls, 3) from the point that `mean` is told of.

@@ -8,7 +8,6 @@ taken with the doubt of such a spot's middle.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -51,4 +50,4 @@ def _denied(ball: int, seen: Mapping[int, Collection[int]]) -> bool:
 
 
 def _doubted(sighting: BallSighting) -> BallSighting:
-    return replace(sighting, cov_px=frozen_array(sighting.cov_px + DOUBT_PX**2 * np.eye(2)))
+    return sighting._replace(cov_px=frozen_array(sighting.cov_px + DOUBT_PX**2 * np.eye(2)))

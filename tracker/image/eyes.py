@@ -9,7 +9,7 @@ import numpy as np
 
 from tracker.image.album import Album
 from tracker.image.appearance import MISFIT_MAX, Appearance
-from tracker.image.look import Fitted, Gaze, Look, gaze_of, look_near
+from tracker.image.look import Fitted, Look, gaze_of, look_near
 from tracker.image.rivals import first_rivals
 from tracker.image.sight import MISFIT
 from tracker.image.tint import Bgr, Gains, Tint, core_colour
@@ -37,7 +37,7 @@ class Eyes:
         self._rivals = [first_rivals() for _ in rig.cameras]
         self._albums = [Album(camera) for camera in rig.cameras]
         self._tints = [Tint() for _ in rig.cameras]
-        self._gazes = [self._gaze(index, rivals.best) for index, rivals in enumerate(self._rivals)]
+        self._gazes = [gaze_of(rig, Appearance(), album) for album in self._albums]
         self._turn = 0
         self._taught_blindly = False
         self._sum_up()
@@ -47,15 +47,12 @@ class Eyes:
         appearances = [rivals.best for rivals in self._rivals]
         for index, appearance in enumerate(appearances):
             if self._gazes[index].appearance is not appearance:
-                self._gazes[index] = self._gaze(index, appearance)
+                self._gazes[index] = self._gazes[index].at_such(appearance)
         self._exposures_s = tuple([appearance.response.exposure_s for appearance in appearances])
         self.doubts_px = np.array([rivals.doubt_px for rivals in self._rivals])
         self._gamma_known = all(rivals.settled for rivals in self._rivals)
         enough = all(rivals.count >= LEARN_ALL for rivals in self._rivals)
         self._settled = self._gamma_known and enough  # how balls look is known, so that little is left to learn
-
-    def _gaze(self, index: int, appearance: Appearance) -> Gaze:
-        return gaze_of(self._rig, appearance, self._albums[index], self._tints[index].gains)
 
     def stand(self, rig: Rig) -> None:
         """Take the cameras to stand elsewhere."""
@@ -89,7 +86,7 @@ class Eyes:
         """Take the light in one camera to be so; the colours looked for change in few, large steps."""
         self._tints[index], gaze = tint, self._gazes[index]
         if tint.gains.undoing != gaze.undoing:
-            self._gazes[index] = self._gaze(index, gaze.appearance)
+            self._gazes[index] = gaze_of(self._rig, gaze.appearance, gaze.album, tint.gains)
 
     def look(self, frames: Sequence[Frame], state: State) -> Look:
         """Find each ball in each image where a state expects it."""

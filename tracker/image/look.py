@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,8 +27,7 @@ from tracker.types import Array, BallSighting, Frame, Reason, Rejected, frozen_a
 NEAREST_M = 0.3  # a ball closer to a camera than this is not looked for
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Fitted:
+class Fitted(NamedTuple):  # as `BallSighting`
     """A sighting, and what `Appearance` learns from.
 
     view: a row of `view.expected_views`.  fit (sight.SIZE,): what was found.
@@ -73,8 +73,8 @@ class Look:
     def doubted(self, sigma_px: float) -> Look:
         """Return it with sightings that are less sure, by one sigma on each axis [px]."""
         more = sigma_px**2 * np.eye(2)
-        doubted = (replace(one.sighting, cov_px=frozen_array(one.sighting.cov_px + more)) for one in self.fitted)
-        fitted = [replace(one, sighting=sighting) for one, sighting in zip(self.fitted, doubted, strict=True)]
+        doubted = (one.sighting._replace(cov_px=frozen_array(one.sighting.cov_px + more)) for one in self.fitted)
+        fitted = [one._replace(sighting=sighting) for one, sighting in zip(self.fitted, doubted, strict=True)]
         return Look(fitted, self.rejections, self.blind)
 
 
@@ -91,6 +91,10 @@ class Gaze:
     colours: tuple[ColourTable, ...]
     album: Album
     undoing: tuple[int, int]
+
+    def at_such(self, appearance: Appearance) -> Gaze:
+        """Return it for balls that look so."""
+        return Gaze(appearance, known_of(appearance.response), self.colours, self.album, self.undoing)
 
 
 def gaze_of(rig: Rig, appearance: Appearance, album: Album, gains: Gains = NEUTRAL) -> Gaze:

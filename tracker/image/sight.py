@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,7 +35,6 @@ Known = tuple[Array, int, Array, Array]
 """Of a camera: variances of its blurs [px^2] and exposure [s], side of its blocks, light and trust of grey levels."""
 
 
-@lru_cache(maxsize=64)
 def known_of(response: Response) -> Known:
     """Return how a camera answers to light, as compiled code takes it."""
     block = response.block_px
