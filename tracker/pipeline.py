@@ -81,30 +81,31 @@ class Tracker:
 
     def step(self, event: Event) -> Step:
         """Take one event of the source and return what came of it."""
-        harvest = Harvest()
         if isinstance(event, Frame) and 0 <= event.camera < len(self._rig.cameras):
             offset_ns = self._rig.cameras[event.camera].clock_offset_ns
             event = replace(event, t_ns=event.t_ns + offset_ns) if offset_ns else event
         if isinstance(event, Silence):
             self._intake.wait(event.t_ns)
         if isinstance(event, Rejected):
-            harvest.rejections.append(event)
-        else:
-            refused = self._intake.refuse(event) if isinstance(event, Frame) else None
-            if refused is not None:
-                harvest.rejections.append(refused)
-            else:
-                for frames in self._rounds.take(event):
-                    self._take_round(frames, harvest)
-            self._watch_the_time(event.t_ns)
+            return Step(self._track, rejections=(event,))
+        refused = self._intake.refuse(event) if isinstance(event, Frame) else None
+        rounds = self._rounds.take(event) if refused is None else []
+        harvest = self._work_off(rounds) if rounds else None
+        self._watch_the_time(event.t_ns)
+        if harvest is None:
+            return Step(self._track, rejections=() if refused is None else (refused,))
         return self._step(harvest)
 
     def finish(self) -> Step:
         """Work off the round that was still open when the frames ended."""
+        return self._step(self._work_off(self._rounds.rest()))
+
+    def _work_off(self, rounds: Sequence[Round]) -> Harvest:
+        """Take rounds in their order and return what they gave."""
         harvest = Harvest()
-        for frames in self._rounds.rest():
+        for frames in rounds:
             self._take_round(frames, harvest)
-        return self._step(harvest)
+        return harvest
 
     def _step(self, harvest: Harvest) -> Step:
         return Step(
