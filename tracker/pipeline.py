@@ -235,11 +235,12 @@ class Tracker:
 
     def _hardly_seen(self, found: Update) -> bool:
         """Say whether for a while fewer sightings were made than make a pose: what seems another is soon a mistake."""
-        for sighting in found.used:
-            place = sighting.camera, sighting.ball
-            self._seen_ns[place] = max(self._seen_ns.get(place, sighting.t_ns), sighting.t_ns)
-        newest_ns = max(self._seen_ns.values())
-        lately = [place for place, seen_ns in self._seen_ns.items() if newest_ns - seen_ns <= POSED_NS]
+        seen_ns = self._seen_ns
+        for camera, ball, t_ns, _, _ in found.used:
+            if seen_ns.get((camera, ball), t_ns) <= t_ns:
+                seen_ns[camera, ball] = t_ns
+        newest_ns = max(seen_ns.values())
+        lately = [place for place, t_ns in seen_ns.items() if newest_ns - t_ns <= POSED_NS]
         return len(lately) < POSED or len({ball for _, ball in lately}) < 2
 
     def _still_known(self, start: State) -> State:

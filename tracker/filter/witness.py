@@ -36,8 +36,10 @@ def doubted_alone(sightings: Sequence[BallSighting], last: State | None) -> tupl
 
     last: what the sightings before left known; None while nothing is tracked.
     """
+    if last is None or max(last.P.diagonal()[ATTITUDE].tolist()) < OPEN_RAD**2:
+        return tuple(sightings)
     cameras = {sighting.camera for sighting in sightings}
-    if last is None or len(cameras) < 2 or max(last.P.diagonal()[ATTITUDE].tolist()) < OPEN_RAD**2:
+    if len(cameras) < 2:
         return tuple(sightings)
     seen = {camera: {s.ball for s in sightings if s.camera == camera} for camera in cameras}
     return tuple(_doubted(one) if _denied(one.ball, seen) else one for one in sightings)

@@ -67,8 +67,7 @@ def fit_centre(image: Image, ball: Expected) -> Centre | Reason:
         return Reason.AT_BORDER
     patch, fit = cut(image, extent, ball.response), np.empty(6)
     luma, chroma = templates_of(ball)
-    drawn = luma.fine, luma.made, chroma.fine, chroma.made
-    gauss_newton(patch.bright, patch.colour, *drawn, numbers_of(ball), extent.du, extent.dv, fit)
+    gauss_newton(patch.bright, patch.colour, *luma, *chroma, numbers_of(ball), extent.du, extent.dv, fit)
     du, dv, cov_uu, cov_uv, cov_vv, misfit = fit.tolist()
     if not math.hypot(du - extent.du, dv - extent.dv) <= MAX_SHIFT_PX:
         return Reason.NO_BALL

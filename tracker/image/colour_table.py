@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,7 @@ FIXED_POINT = 12  # bits behind the point in OpenCV's 8-bit HSV
 NEVER = LEVELS  # a spread that no pixel has
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ColourTable:
+class ColourTable(NamedTuple):  # spread out into compiled calls
     """The colours of n balls, a row each, prepared for `tracker.image.detect`.
 
     A pixel has a colour when the spread between its largest and least channel is at least that of its largest
@@ -47,7 +46,7 @@ def colours_of_each(balls: tuple[Ball, ...], undoing: tuple[int, int]) -> tuple[
 
 @lru_cache(maxsize=1024)
 def _in_light(balls: tuple[Ball, ...], blue: int, red: int) -> ColourTable:
-    return replace(_tables(balls), blue=blue, red=red)
+    return _tables(balls)._replace(blue=blue, red=red)
 
 
 @lru_cache(maxsize=64)

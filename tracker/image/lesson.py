@@ -53,8 +53,7 @@ def sample_of(patch: Patch, ball: Expected, centre: tuple[float, float]) -> Samp
     """Look at a fitted ball again, and past what is in front of it or beside it. The patch is used up."""
     numbers, (luma, chroma) = numbers_of(ball), templates_of(ball)
     slopes = np.empty((2, patch.bright.shape[1]))
-    drawn = luma.fine, luma.made, chroma.fine, chroma.made
-    by_luma, by_chroma = _look_again(patch.bright, patch.colour, *drawn, numbers, *centre, slopes)
+    by_luma, by_chroma = _look_again(patch.bright, patch.colour, *luma, *chroma, numbers, *centre, slopes)
     return Sample(patch, ball, numbers, luma, centre, slopes, by_luma > 0.0, by_chroma > 0.0)
 
 
@@ -99,7 +98,7 @@ def _misfit(sample: Sample, exposure_s: float) -> float:
     """Return the sum of squares that the ball's fit leaves in its brightness under another exposure."""
     numbers, (speed_u, speed_v) = sample.numbers.copy(), sample.ball.speed_px_s
     numbers[STREAK_U], numbers[STREAK_V] = speed_u * exposure_s, speed_v * exposure_s
-    return squares_at(sample.patch.bright, sample.luma.fine, sample.luma.made, numbers, LUMA_VAR, *sample.centre)
+    return squares_at(sample.patch.bright, *sample.luma, numbers, LUMA_VAR, *sample.centre)
 
 
 def _stepped(now: float, less: bool, step: float, most: float) -> float:
@@ -164,8 +163,8 @@ def light_on(sample: Sample, lamp: Vector) -> tuple[Array, Array] | None:
     """
     ball, pixels = sample.ball, sample.patch.bright
     template = _terms_of(*steps_of(ball.radius_px, ball.response.luma_px), lamp)
-    information, target, drawn = np.empty((TERMS, TERMS)), np.empty(TERMS), (template.fine, template.made)
-    mean = _equations(*drawn, sample.numbers, pixels, *sample.centre, sample.slopes, information, target)
+    information, target = np.empty((TERMS, TERMS)), np.empty(TERMS)
+    mean = _equations(*template, sample.numbers, pixels, *sample.centre, sample.slopes, information, target)
     return (information * mean**2, target * mean) if mean > 0.0 else None
 
 

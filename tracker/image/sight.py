@@ -58,10 +58,7 @@ def find_ball(
         None; NO_BALL when nothing of its colour and size is there or the fit runs away, AT_BORDER when it is cut off.
     """
     luma, chroma = drawn
-    status = _find_and_fit(
-        image, colour.least_spread, colour.lowest_spread, colour.hues, colour.blue, colour.red, view, *known, luma.fine,
-        luma.made, chroma.fine, chroma.made, fit,
-    )  # fmt: skip
+    status = _find_and_fit(image, *colour, view, *known, *luma, *chroma, fit)
     return None if status == _FOUND else _REASONS[status]
 
 
