@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import chain
 
 from bridge.clock import Nanoseconds
 from bridge.dialect import Encoder, Identity
@@ -91,17 +92,17 @@ class Outlet:
         self._now_ns = now_ns
         self._calibration = self._calibration if step.health is None else step.health.brief
         for spout in self._spouts:
-            self._received.extend((spout.link.name, message) for message in spout.hear())
+            self._received.extend([(spout.link.name, message) for message in spout.hear()])
             superseded = spout.link.state().superseded
             for message in spout.dialogue.due(step.state, now_ns, superseded, self._calibration):
                 spout.link.send(message)
         for estimate in step.estimates:
-            going = [spout for spout in self._spouts if spout.dialogue.admits(estimate, now_ns)]
-            wanted = dict.fromkeys(name for spout in going for name in spout.dialogue.messages)
-            packed = self._packer.messages(estimate, wanted)
-            for spout in going:
-                for name in spout.dialogue.messages:
-                    spout.link.send(packed[name])
+            admitted = [spout for spout in self._spouts if spout.dialogue.admits(estimate, now_ns)]
+            going = [(spout.link, spout.dialogue.messages) for spout in admitted]
+            packed = self._packer.messages(estimate, dict.fromkeys(chain.from_iterable(names for _, names in going)))
+            for link, names in going:
+                for name in names:
+                    link.send(packed[name])
             self._watch(estimate, now_ns)
         return self._sent()
 
@@ -117,7 +118,7 @@ class Outlet:
 
     def received(self) -> tuple[tuple[str, Received], ...]:
         """Return the messages that came in up to the last `send` and were not yet returned, with their link's URI."""
-        return tuple(self._received.popleft() for _ in range(len(self._received)))
+        return tuple([self._received.popleft() for _ in range(len(self._received))])
 
     def far_ends(self) -> tuple[DialogueState, ...]:
         """Return what was known of each link's far end at the last `send`, in the links' order."""
@@ -142,7 +143,7 @@ class Outlet:
             spout.dialogue.watch(estimate.t_ns, v_N, yaw, now_ns)
 
     def _sent(self) -> tuple[Sent, ...]:
-        return tuple(record for spout in self._spouts for record in spout.link.sent())
+        return tuple([record for spout in self._spouts for record in spout.link.sent()])
 
 
 def open_outlet(

@@ -31,9 +31,7 @@ class Cadence:
         found = {}
         for frame in frames:
             jump_ns = self._jump(frame)
-            others = [other for other in frames if other.camera != frame.camera]
-            shared = any(abs(other.t_ns - frame.t_ns) <= TOGETHER_NS for other in others)
-            if jump_ns > 0.0 and not shared:
+            if jump_ns > 0.0 and not _shared(frame, frames):
                 found[frame.camera] = min(jump_ns, MOST_NS) * 1e-9
         return found
 
@@ -57,3 +55,9 @@ class Cadence:
             return abs(interval_ns - usual_ns)
         self._usual_ns[frame.camera] += FADING * off_ns / beats
         return 0.0
+
+
+def _shared(frame: Frame, frames: Sequence[Frame]) -> bool:
+    """Say whether another camera of a round shares a frame's stamp."""
+    others = [other for other in frames if other.camera != frame.camera]
+    return any(abs(other.t_ns - frame.t_ns) <= TOGETHER_NS for other in others)

@@ -8,7 +8,6 @@ It reads no clock but the stopwatch it is given, and touches no file and no devi
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
@@ -16,12 +15,11 @@ from types import MappingProxyType
 import numpy as np
 
 from tracker.cadence import Cadence
-from tracker.filter.bias import shared_covariance
 from tracker.filter.continuity import Continuity
 from tracker.filter.ekf import Update
 from tracker.filter.history import History
 from tracker.filter.predict import Prediction, first_guess, predict
-from tracker.filter.sag import sag_covariance
+from tracker.filter.reported import reported
 from tracker.harvest import Harvest
 from tracker.health.background import LIMIT_PX
 from tracker.health.mend import SHARE
@@ -35,11 +33,10 @@ from tracker.rig import Rig
 from tracker.rounds import Rounds
 from tracker.standing import Health
 from tracker.start.acquire import Seen, first_state
-from tracker.state import OFFSETS, REPORTED, State
+from tracker.state import OFFSETS, State
 from tracker.study import Round, Study
 from tracker.tuning import Tuning
 from tracker.types import (
-    Array,
     Estimate,
     Event,
     Frame,
@@ -84,30 +81,31 @@ class Tracker:
 
     def step(self, event: Event) -> Step:
         """Take one event of the source and return what came of it."""
-        harvest = Harvest()
         if isinstance(event, Frame) and 0 <= event.camera < len(self._rig.cameras):
             offset_ns = self._rig.cameras[event.camera].clock_offset_ns
             event = replace(event, t_ns=event.t_ns + offset_ns) if offset_ns else event
         if isinstance(event, Silence):
             self._intake.wait(event.t_ns)
         if isinstance(event, Rejected):
-            harvest.rejections.append(event)
-        else:
-            refused = self._intake.refuse(event) if isinstance(event, Frame) else None
-            if refused is not None:
-                harvest.rejections.append(refused)
-            else:
-                for frames in self._rounds.take(event):
-                    self._take_round(frames, harvest)
-            self._watch_the_time(event.t_ns)
+            return Step(self._track, rejections=(event,))
+        refused = self._intake.refuse(event) if isinstance(event, Frame) else None
+        rounds = self._rounds.take(event) if refused is None else []
+        harvest = self._work_off(rounds) if rounds else None
+        self._watch_the_time(event.t_ns)
+        if harvest is None:
+            return Step(self._track, rejections=() if refused is None else (refused,))
         return self._step(harvest)
 
     def finish(self) -> Step:
         """Work off the round that was still open when the frames ended."""
+        return self._step(self._work_off(self._rounds.rest()))
+
+    def _work_off(self, rounds: Sequence[Round]) -> Harvest:
+        """Take rounds in their order and return what they gave."""
         harvest = Harvest()
-        for frames in self._rounds.rest():
+        for frames in rounds:
             self._take_round(frames, harvest)
-        return self._step(harvest)
+        return harvest
 
     def _step(self, harvest: Harvest) -> Step:
         return Step(
@@ -237,11 +235,12 @@ class Tracker:
 
     def _hardly_seen(self, found: Update) -> bool:
         """Say whether for a while fewer sightings were made than make a pose: what seems another is soon a mistake."""
-        for sighting in found.used:
-            place = sighting.camera, sighting.ball
-            self._seen_ns[place] = max(self._seen_ns.get(place, sighting.t_ns), sighting.t_ns)
-        newest_ns = max(self._seen_ns.values())
-        lately = [place for place, seen_ns in self._seen_ns.items() if newest_ns - seen_ns <= POSED_NS]
+        seen_ns = self._seen_ns
+        for camera, ball, t_ns, _, _ in found.used:
+            if seen_ns.get((camera, ball), t_ns) <= t_ns:
+                seen_ns[camera, ball] = t_ns
+        newest_ns = max(seen_ns.values())
+        lately = [place for place, t_ns in seen_ns.items() if newest_ns - t_ns <= POSED_NS]
         return len(lately) < POSED or len({ball for _, ball in lately}) < 2
 
     def _still_known(self, start: State) -> State:
@@ -261,17 +260,17 @@ class Tracker:
 
     def _estimate(self, found: Update, available_ns: int, stages: dict[str, int]) -> Estimate:
         state = found.state
-        covariance = state.P[:REPORTED, :REPORTED].copy()
-        covariance[:3, :3] += self._shared(state) + sag_covariance(state)
+        covariance, sigmas_s = reported(state, self._rig, self._eyes.exposure_s, self._eyes.doubts_px, self._moved_px)
+        mean = frozen_array(state.mean)
         return Estimate(
             t_ns=state.t_ns,
-            p_BinW=frozen_array(state.p_BinW),
-            R_BtoW=frozen_array(state.R_BtoW),
-            v_BinW=frozen_array(state.v_BinW),
-            w_BinB=frozen_array(state.w_BinB),
-            covariance=frozen_array(covariance),
-            clock_offsets_s=frozen_array(state.offsets_s),
-            clock_sigmas_s=frozen_array([0.0, *(math.sqrt(v) for v in state.P.diagonal()[OFFSETS:].tolist())]),
+            p_BinW=mean[:3],
+            R_BtoW=mean[3:12].reshape(3, 3),
+            v_BinW=mean[12:15],
+            w_BinB=mean[15:18],
+            covariance=covariance,
+            clock_offsets_s=mean[24:],
+            clock_sigmas_s=sigmas_s,
             state=self._track,
             reset_counter=self._continuity.resets,
             nis=found.nis,
@@ -279,10 +278,6 @@ class Tracker:
             available_ns=available_ns,
             stages_ns=MappingProxyType(stages),
         )
-
-    def _shared(self, state: State) -> Array:
-        doubts_px = np.hypot(self._eyes.doubts_px, self._moved_px)
-        return shared_covariance(state, self._rig, self._eyes.exposure_s, doubts_px)
 
 
 def _late(frame: Frame) -> Rejected:

@@ -64,7 +64,8 @@ class Rounds:
         frames = tuple([self._open[camera] for camera in sorted(self._open)])
         for camera in together:
             self._shared[camera].append(together)
-            self._companions[camera] = NOBODY.union(*self._shared[camera])
+            if self._companions[camera] != together:
+                self._companions[camera] = NOBODY.union(*self._shared[camera])
         self._closed, self._closed_ns = together, max([frame.t_ns for frame in frames])
         self._open = {}
         return frames

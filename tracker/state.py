@@ -16,7 +16,7 @@ OFFSETS = 18  # errors of the clock offsets of cameras 1, 2, ... begin here
 REPORTED = 12  # the first of the errors, which `Estimate.covariance` is of
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Process:
     """How briskly the vehicle manoeuvres, from its envelope and not from any recording.
 

@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -98,8 +99,7 @@ class Silence:
 Event = Frame | Silence | Rejected
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class BallSighting:
+class BallSighting(NamedTuple):  # made for each ball that is found: a tuple costs a quarter of a dataclass
     """Where one camera saw one ball.
 
     uv_px: (2,) centre in the distorted image, pixel centres at integers [px].
@@ -155,8 +155,7 @@ class Estimate:
     clock_sigmas_s: Array = field(default_factory=lambda: frozen_array(()))
 
 
-@dataclass(frozen=True, slots=True)
-class Step:
+class Step(NamedTuple):  # made for each event
     """What one event did to the tracker.
 
     estimates are in order of time, each newer than any given before; usually none or one.

@@ -94,7 +94,7 @@ class Faults:
         """Move estimates aside while they are to jump; each way counts as one discontinuity."""
         if not self._counts or not step.estimates:
             return step
-        return replace(step, estimates=tuple(self._moved(estimate) for estimate in step.estimates))
+        return step._replace(estimates=tuple(self._moved(estimate) for estimate in step.estimates))
 
     def rehearse(self, world: World, flight: Flight) -> Iterator[None]:
         """Do one fault after the other, with a quiet hover before each."""

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from tracker.filter.clocks import given_clocks
 from tracker.filter.correction import innovation_covariance, path_noise
 from tracker.filter.manoeuvre import variances
-from tracker.filter.measure import Indices, camera_table, marker_points, pixels
+from tracker.filter.measure import Indices, camera_table, pixels
 from tracker.filter.predict import Prediction
 from tracker.filter.sag import sag_noise
 from tracker.filter.singer import process_noise
@@ -19,8 +19,7 @@ from tracker.state import OFFSETS
 from tracker.types import Array, BallSighting
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Batch:
+class Batch(NamedTuple):
     """Sightings as arrays, and what the prediction says of them.
 
     z (2n,), R (2n, 2n): pixels and the noise of fit and camera.  cameras, balls, lags_s (n,) [s].
@@ -67,18 +66,15 @@ class Batch:
 def make_batch(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig) -> Batch:
     """Compare sightings with a prediction. A ball predicted behind its camera has NaN for an innovation."""
     state, T = ahead.state, ahead.process.manoeuvre_s
-    cameras = np.array([s.camera for s in sightings])
-    balls = np.array([s.ball for s in sightings])
-    lags_s = np.array([s.t_ns - state.t_ns for s in sightings]) * 1e-9
+    cameras, balls, lags_ns = np.array([(s.camera, s.ball, s.t_ns - state.t_ns) for s in sightings]).T.copy()
+    lags_s = lags_ns * 1e-9
     z = np.concatenate([s.uv_px for s in sightings])
     covs_px = np.concatenate([s.cov_px for s in sightings])
-    points_inB = marker_points(rig) - ahead.pivot_inB
-    h, H = pixels(state.mean, T, cameras, balls, lags_s, camera_table(rig), points_inB)
-    true_lags_s = lags_s + state.offsets_s[cameras]
-    R, A, B, path, doubt = _covariances(H, ahead.P_coasted, ahead.dt, T, covs_px, state.noise, cameras, true_lags_s)
-    if ahead.turn_open:
-        A += sag_noise(H, balls, points_inB, state.mean, state.P)
-    return Batch(sightings, z, R, cameras, balls, lags_s, z - h, A, B, path, doubt, variances(ahead.process)[:, -1])
+    y, R, A, B, path, doubt = _compared(
+        state.mean, state.P, ahead.P_coasted, ahead.dt, T, z, covs_px, state.noise, cameras, balls, lags_s,
+        camera_table(rig), ahead.points_of(rig), ahead.turn_open,
+    )  # fmt: skip
+    return Batch(sightings, z, R, cameras, balls, lags_s, y, A, B, path, doubt, variances(ahead.process)[:, -1])
 
 
 @compiled("f8[::1](f8[::1], f8[:, ::1], f8[:, :, ::1], f8[:])")
@@ -141,3 +137,26 @@ def _covariances(
         B[k] = innovation_covariance(H, unit, path[k])
     doubt = _doubt(P, given_clocks(P), H, cameras)
     return R, innovation_covariance(H, P, R + doubt), B, path, doubt
+
+
+@compiled("Tuple((f8[::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1]))"
+          "(f8[::1], f8[:, ::1], f8[:, ::1], f8, f8, f8[::1], f8[:, ::1], f8[:, ::1], i8[::1], i8[::1], f8[::1],"
+          " f8[:, ::1], f8[:, ::1], b1)")  # fmt: skip
+def _compared(
+    mean: Array, P: Array, P_coasted: Array, dt: float, T: float, z: Array, covs_px: Array, noise: Array,
+    cameras: Indices, balls: Indices, lags_s: Array, table: Array, points_inB: Array, turn_open: bool,
+) -> tuple[Array, Array, Array, Array, Array, Array]:  # fmt: skip
+    """Return y, R, A, B, path and doubt of a `Batch`.
+
+    Args:
+        mean, P, P_coasted, dt, turn_open: of the `Prediction`.  z, cameras, balls, lags_s: the batch's.
+        covs_px, noise: as `_covariances` takes them.  T, table, points_inB: as `pixels` does.
+    """
+    h, H = pixels(mean, T, cameras, balls, lags_s, table, points_inB)
+    true_lags_s = np.empty(len(lags_s))
+    for s in range(len(lags_s)):
+        true_lags_s[s] = lags_s[s] + mean[24 + cameras[s]]
+    R, A, B, path, doubt = _covariances(H, P_coasted, dt, T, covs_px, noise, cameras, true_lags_s)
+    if turn_open:
+        A += sag_noise(H, balls, points_inB, mean, P)
+    return z - h, R, A, B, path, doubt

@@ -30,11 +30,11 @@ def shared_covariance(state: State, rig: Rig, exposure_s: float, doubts_px: Arra
         f / d (I - u u'), u the ray, d the distance; so the covariance is (sum (f / d s)^2 (I - u u'))^-1. s grows with
         the streak f / d |(I - u u') v| exposure, and with the doubts.
     """
-    return _shared(state.mean, camera_table(rig), exposure_s, doubts_px)
+    return shared(state.mean, camera_table(rig), exposure_s, doubts_px)
 
 
 @compiled("f8[:, ::1](f8[::1], f8[:, ::1], f8, f8[::1])")
-def _shared(mean: Array, table: Array, exposure_s: float, doubts_px: Array) -> Array:
+def shared(mean: Array, table: Array, exposure_s: float, doubts_px: Array) -> Array:
     """Return what `shared_covariance` does, of a `State.mean` and a `camera_table`."""
     information, u = np.zeros((3, 3)), np.empty(3)
     for c in range(len(table)):

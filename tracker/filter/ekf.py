@@ -11,16 +11,15 @@ state goes in, a new state comes out.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
 from itertools import combinations
 from threading import get_ident
+from typing import NamedTuple
 
 import numpy as np
 from filterpy.kalman import KalmanFilter
 
 from tracker.filter.batch import Batch, make_batch
-from tracker.filter.clocks import taught
 from tracker.filter.correction import inverse_of
 from tracker.filter.fit import Fit, fit
 from tracker.filter.posterior import settled
@@ -33,8 +32,7 @@ from tracker.types import BallSighting, Reason, Rejected
 MAX_SUSPECTS = 8
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Update:
+class Update(NamedTuple):
     """An updated state, its NIS and degrees of freedom, what was used and what was left out."""
 
     state: State
@@ -66,11 +64,8 @@ def update(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig, pro
     distances2 = batch.distances2()
     limit = chi2_limit(probability, 2)
     near = [i for i, distance2 in enumerate(distances2) if distance2 <= limit]
-    rejected = [
-        _left_out(sightings[i], rig, distance2, "from the prediction")
-        for i, distance2 in enumerate(distances2)
-        if not distance2 <= limit
-    ]
+    far = sorted({*range(len(sightings))}.difference(near)) if len(near) < len(sightings) else []
+    rejected = [_left_out(sightings[i], rig, distances2[i], "from the prediction") for i in far]
     if not near:
         return Rejected(Reason.FRAME_GATE, "no sighting near the prediction", ahead.state.t_ns)
     batch = batch.part(near)
@@ -86,7 +81,7 @@ def update(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig, pro
         detail = f"NIS {whole.nis:.0f} with {2 * len(near)} degrees of freedom"
         return Rejected(Reason.FRAME_GATE, detail, ahead.state.t_ns)
     for sighting, gain in zip(batch.sightings, whole.gains() if best is not whole else (), strict=False):
-        if sighting not in best.batch.sightings:
+        if not any(sighting is one for one in best.batch.sightings):
             rejected.append(_left_out(sighting, rig, float(gain), "from what the others say"))
     state = at_origin(_posterior(ahead, best), ahead.pivot_inB)
     return Update(state, best.nis, len(best.u), best.batch.sightings, tuple(rejected))
@@ -145,8 +140,9 @@ def _posterior(ahead: Prediction, best: Fit) -> State:
     prior, step = ahead.state, _linear_step(len(best.P), get_ident())
     step.x, step.P = np.zeros((len(best.P), 1)), best.P
     step.update(best.y[:, None], best.R, best.H)
-    dx, P_after = taught(prior.mean, best.P, ahead.dt, best.H, best.dx, step.P)
-    mean, P, noise = settled(prior.mean, dx, P_after, prior.noise, best.batch.cameras, best.u, best.inverse)
+    mean, P, noise = settled(
+        prior.mean, best.P, ahead.dt, best.H, best.dx, step.P, prior.noise, best.batch.cameras, best.u, best.inverse
+    )
     return prior.at_mean(prior.t_ns, mean, P, best.levels, noise)
 
 

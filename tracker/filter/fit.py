@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,7 +11,7 @@ from tracker.filter.batch import Batch
 from tracker.filter.bend import bend_noise
 from tracker.filter.correction import TILT_ROWS, likeliest, log_likelihoods, weighed
 from tracker.filter.manoeuvre import expected, judged
-from tracker.filter.measure import camera_table, marker_points
+from tracker.filter.measure import Indices, camera_table
 from tracker.filter.predict import Prediction
 from tracker.filter.singer import process_noise
 from tracker.maths.compiled import compiled
@@ -26,8 +25,7 @@ LEAST_DOUBT = 0.2  # of the pixels' own noise: less does not matter
 SHORTEST_S = 1e-3  # a tilt measured twice within less tells no more
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Fit:
+class Fit(NamedTuple):
     """A fit of a batch: the error dx found, and what leads there from the prior by one linear update.
 
     P: prior covariance with the manoeuvre's noise in it.  levels: of the manoeuvre, after these sightings.
@@ -126,25 +124,37 @@ def _likelier(agreed: Fit | None, doubted: Fit | None) -> Fit | None:
 def _fitted(ahead: Prediction, batch: Batch, rig: Rig, levels: Array, P: Array, R: Array) -> Fit | None:
     """Fit with a given prior covariance P and noise R, which is not kept; None when the fit runs away."""
     n, R = len(batch.z), R.copy()
-    dx, y, H, variances = _solve(ahead, batch, rig, P, R)
-    if not math.isfinite(dx @ dx):
-        return None
-    if max(variances[ATTITUDE].tolist()) > LEAST_OPEN_TURN_RAD**2 / 3.0:
+    stands, turn_open, dx, y, H, u, inverse, nis = _solve(ahead, batch, rig, P, R)
+    if stands and turn_open:
         bend = _bend(ahead, batch, rig, dx, P, H, R)
         if bend is not None:
             R[:n, :n] += bend
-            dx, y, H, variances = _solve(ahead, batch, rig, P, R)
-            if not math.isfinite(dx @ dx):
-                return None
-    u, inverse, nis = weighed(y, H, P, R)
-    return Fit(batch, dx, P, levels, y, H, R, u, inverse, nis)
+            stands, _, dx, y, H, u, inverse, nis = _solve(ahead, batch, rig, P, R)
+    return Fit(batch, dx, P, levels, y, H, R, u, inverse, nis) if stands else None
 
 
-def _solve(ahead: Prediction, batch: Batch, rig: Rig, P: Array, R: Array) -> tuple[Array, Array, Array, Array]:
-    return likeliest(
+Solution = tuple[bool, bool, Array, Array, Array, Array, Array, float]
+"""Whether there is one; whether it leaves a turn open; dx, y, H, u, inverse and nis of a `Fit`."""
+
+
+def _solve(ahead: Prediction, batch: Batch, rig: Rig, P: Array, R: Array) -> Solution:
+    return _solved(
         ahead.state.mean, P, ahead.process.manoeuvre_s, batch.z, R, batch.cameras, batch.balls, batch.lags_s,
-        camera_table(rig), marker_points(rig) - ahead.pivot_inB,
+        camera_table(rig), ahead.points_of(rig),
     )  # fmt: skip
+
+
+@compiled("Tuple((b1, b1, f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], f8))(f8[::1], f8[:, ::1], f8, f8[::1],"
+          " f8[:, ::1], i8[::1], i8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")  # fmt: skip
+def _solved(
+    mean: Array, P: Array, T: float, z: Array, R: Array, cameras: Indices, balls: Indices, lags_s: Array,
+    table: Array, points_inB: Array,
+) -> Solution:  # fmt: skip
+    """Find the likeliest state and weigh the innovations there; arguments as for `likeliest`."""
+    dx, y, H, variances = likeliest(mean, P, T, z, R, cameras, balls, lags_s, table, points_inB)
+    u, inverse, nis = weighed(y, H, P, R)
+    turn_open = variances[ATTITUDE].max() > LEAST_OPEN_TURN_RAD**2 / 3.0
+    return np.isfinite(dx).all(), turn_open, dx, y, H, u, inverse, nis
 
 
 def _bend(ahead: Prediction, batch: Batch, rig: Rig, dx: Array, P: Array, H: Array, R: Array) -> Array | None:
@@ -156,7 +166,7 @@ def _bend(ahead: Prediction, batch: Batch, rig: Rig, dx: Array, P: Array, H: Arr
     after = P - HP.T @ np.linalg.solve(HP @ H.T + R, HP)
     noise = bend_noise(
         ahead.state.mean, dx, after, ahead.process.manoeuvre_s, batch.cameras, batch.balls, batch.lags_s,
-        camera_table(rig), marker_points(rig) - ahead.pivot_inB,
+        camera_table(rig), ahead.points_of(rig),
     )  # fmt: skip
     little = np.diag(noise) < BEND_SHARE**2 * np.diag(R)[: len(noise)]
     return None if bool(little.all()) else np.asarray(noise)

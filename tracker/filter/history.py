@@ -50,7 +50,7 @@ class History:
         if self._updates:
             newest = self._updates[-1]
             noise = doubted(newest.state.noise, camera, sigma_px)
-            self.restart(replace(newest, state=replace(newest.state, noise=noise)))
+            self.restart(newest._replace(state=replace(newest.state, noise=noise)))
 
     def back_to(self, t_ns: int) -> list[Later]:
         """Take back the updates after an instant that is not forgotten; return them in order of time."""

@@ -2,40 +2,47 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
 from tracker.filter import manoeuvre
 from tracker.filter.manoeuvre import expected, later
+from tracker.filter.measure import marker_points
 from tracker.filter.pivot import best_known, moved_to
 from tracker.filter.singer import carried, process_noise
 from tracker.maths.compiled import compiled
+from tracker.rig import Rig
 from tracker.state import OFFSETS, Process, State
 from tracker.types import Array
 
+ORIGIN: Array = np.zeros(3)
 OFFSET_WALK = 2e-5  # of a clock offset [s / sqrt s]: crystals drift
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Prediction:
+class Prediction(NamedTuple):
     """A state carried on, before it is known how brisk the manoeuvre was meanwhile.
 
     state: with the covariance that is expected, for who looks for the balls.
     P_coasted: (n, n) covariance without any manoeuvre.  dt: time since the last update [s].
-    pivot_inB: (3,) the point of the body that was known best before [m], the origin where no turn was open.
+    pivot_inB: (3,) the point of the body that was known best before [m], ORIGIN where no turn was open.
     """
 
     state: State
     P_coasted: Array
     dt: float
     process: Process
-    pivot_inB: Array = field(default_factory=lambda: np.zeros(3))
+    pivot_inB: Array = ORIGIN
 
     @property
     def turn_open(self) -> bool:
         """Say whether a turn about the pivot was open."""
-        return bool(np.count_nonzero(self.pivot_inB))
+        return self.pivot_inB is not ORIGIN
+
+    def points_of(self, rig: Rig) -> Array:
+        """Return the balls' centres (n, 3) from the pivot, along B's axes [m]."""
+        points_inB = marker_points(rig)
+        return points_inB - self.pivot_inB if self.turn_open else points_inB
 
     def about_pivot(self) -> Prediction:
         """Return the same prediction, its state and covariances told of the pivot instead of the origin."""
@@ -53,10 +60,11 @@ def predict(state: State, t_ns: int, process: Process) -> Prediction:
         raise ValueError(f"cannot predict back by {-dt} s")
     walk = OFFSET_WALK**2 * dt if process.clock_offset_s > 0.0 else 0.0
     of = manoeuvre.variances(process)
-    mean = state.mean
-    pivot_inB = best_known(mean, state.P)
-    mean, P_coasted, P, levels = _ahead(mean, state.P, pivot_inB, state.levels, of, dt, process.manoeuvre_s, walk)
-    return Prediction(state.at_mean(t_ns, mean, P, levels, state.noise), P_coasted, dt, process, pivot_inB)
+    mean, P_coasted, P, levels, pivot_inB = _ahead(
+        state.mean, state.P, state.levels, of, dt, process.manoeuvre_s, walk
+    )  # fmt: skip
+    ahead = state.at_mean(t_ns, mean, P, levels, state.noise)
+    return Prediction(ahead, P_coasted, dt, process, pivot_inB if pivot_inB.any() else ORIGIN)
 
 
 @compiled("f8[:, ::1](f8[:, ::1], f8[:, ::1])")
@@ -84,16 +92,16 @@ def _told_of(mean: Array, point_inB: Array, P: Array, P_coasted: Array) -> tuple
     return moved, _conjugated(J, P), _conjugated(J, P_coasted)
 
 
-@compiled("Tuple((f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1]))"
-          "(f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8, f8, f8)")  # fmt: skip
+@compiled("Tuple((f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1]))"
+          "(f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8, f8, f8)")  # fmt: skip
 def _ahead(
-    mean: Array, P: Array, pivot: Array, levels: Array, of: Array, dt: float, T: float, walk: float
-) -> tuple[Array, Array, Array, Array]:
-    """Return mean, coasted covariance F P F', covariance with the expected manoeuvre, and levels, after dt.
+    mean: Array, P: Array, levels: Array, of: Array, dt: float, T: float, walk: float
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Return mean, coasted covariance F P F', that with the expected manoeuvre, and levels, after dt; and the pivot.
 
-    pivot: (3,) in B.  of: variances of the levels.  walk: variance that each clock offset gains [s^2].
+    of: variances of the levels.  walk: variance that each clock offset gains [s^2].
     """
-    size = len(P)
+    size, pivot = len(P), best_known(mean, P)
     start, there = moved_to(mean, pivot, size)
     after, F = carried(start, dt, T, size)
     after, back = moved_to(after, -pivot, size)
@@ -103,7 +111,7 @@ def _ahead(
     then = later(levels, dt)
     translation, rotation = expected(then, of)
     P_then = coasted + process_noise(size, dt, T, translation, rotation)
-    return after, _conjugated(back, coasted), _conjugated(back, P_then), then
+    return after, _conjugated(back, coasted), _conjugated(back, P_then), then, pivot
 
 
 def first_guess(state: State, process: Process) -> Prediction:
@@ -113,7 +121,7 @@ def first_guess(state: State, process: Process) -> Prediction:
 
 def at_origin(state: State, pivot_inB: Array) -> State:
     """Return a state that is told of a point of the body as that of the body's origin."""
-    if not np.count_nonzero(pivot_inB):
+    if pivot_inB is ORIGIN:
         return state
     mean, P, _ = _told_of(state.mean, -pivot_inB, state.P, state.P)
     return state.at_mean(state.t_ns, mean, P, state.levels, state.noise)

@@ -11,6 +11,7 @@ import math
 
 import numpy as np
 
+from tracker.filter.measure import Indices
 from tracker.filter.pivot import LEAST_OPEN_TURN_RAD
 from tracker.maths.compiled import compiled
 from tracker.state import State
@@ -35,15 +36,15 @@ def sag_covariance(state: State) -> Array:
         takes it off by phi^2 / 2 e x g - phi^3 / 6 g. At REACH sigmas of phi each is REACH of its sigmas: the factors
         are REACH / 2 s^2 and REACH^2 / 6 s^3.
     """
-    return _sag(state.R_BtoW, state.P)
+    return sag(state.R_BtoW, state.P)
 
 
 @compiled("f8[:, ::1](f8[:, :], f8[:, ::1])")
-def _sag(R: Array, P: Array) -> Array:
+def sag(R: Array, P: Array) -> Array:
     """Return what `sag_covariance` does; zeros where no turn is open."""
-    sag = np.zeros((3, 3))
+    found = np.zeros((3, 3))
     if P[3, 3] + P[4, 4] + P[5, 5] < LEAST_OPEN_TURN_RAD**2:
-        return sag
+        return found
     sigma, axis_inB = widest_turn(P)
     e, g = np.zeros(3), np.zeros(3)
     for i in range(3):
@@ -53,12 +54,12 @@ def _sag(R: Array, P: Array) -> Array:
     across = (e[1] * g[2] - e[2] * g[1], e[2] * g[0] - e[0] * g[2], e[0] * g[1] - e[1] * g[0])
     for i in range(3):
         for j in range(3):
-            sag[i, j] = across[i] * across[j] * (ACROSS * sigma**2) ** 2 + g[i] * g[j] * (ALONG * sigma**3) ** 2
-    return sag
+            found[i, j] = across[i] * across[j] * (ACROSS * sigma**2) ** 2 + g[i] * g[j] * (ALONG * sigma**3) ** 2
+    return found
 
 
 @compiled("f8[:, ::1](f8[:, ::1], i8[::1], f8[:, ::1], f8[::1], f8[:, ::1])")
-def sag_noise(H: Array, balls: Array, points_inB: Array, mean: Array, P: Array) -> Array:
+def sag_noise(H: Array, balls: Indices, points_inB: Array, mean: Array, P: Array) -> Array:
     """Return the covariance (2n, 2n) [px^2] of what that turn does to sightings beyond first order.
 
     H: (2n, size) slope of the sightings.  balls: (n,).  points_inB: (balls, 3) from the point that `mean` is told of.

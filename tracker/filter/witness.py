@@ -8,7 +8,6 @@ taken with the doubt of such a spot's middle.
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -37,8 +36,10 @@ def doubted_alone(sightings: Sequence[BallSighting], last: State | None) -> tupl
 
     last: what the sightings before left known; None while nothing is tracked.
     """
+    if last is None or max(last.P.diagonal()[ATTITUDE].tolist()) < OPEN_RAD**2:
+        return tuple(sightings)
     cameras = {sighting.camera for sighting in sightings}
-    if last is None or len(cameras) < 2 or float(last.P.diagonal()[ATTITUDE].max()) < OPEN_RAD**2:
+    if len(cameras) < 2:
         return tuple(sightings)
     seen = {camera: {s.ball for s in sightings if s.camera == camera} for camera in cameras}
     return tuple(_doubted(one) if _denied(one.ball, seen) else one for one in sightings)
@@ -51,4 +52,4 @@ def _denied(ball: int, seen: Mapping[int, Collection[int]]) -> bool:
 
 
 def _doubted(sighting: BallSighting) -> BallSighting:
-    return replace(sighting, cov_px=frozen_array(sighting.cov_px + DOUBT_PX**2 * np.eye(2)))
+    return sighting._replace(cov_px=frozen_array(sighting.cov_px + DOUBT_PX**2 * np.eye(2)))

@@ -33,6 +33,12 @@ class Wanted(NamedTuple):
     light: Light
 
 
+Steps = tuple[int, int, int, bool]
+"""Of radius and bearing, and whether the ball is small."""
+Looks = tuple[int, int, int, Light]
+"""What of an appearance tells templates apart: steps of both blurs, side of the blocks, light."""
+
+
 class Album:
     """Draws and keeps the templates for one camera.
 
@@ -43,8 +49,9 @@ class Album:
         self.draws_left: int | None = None
         self._camera = camera
         self._serving: dict[tuple[int, int], tuple[Wanted, Template]] = {}  # by ball and side of the box
-        self._as_wanted: dict[int, tuple[tuple[object, ...], tuple[Template, Template]]] = {}  # by ball, no neighbours
+        self._as_wanted: dict[int, tuple[Steps, tuple[Template, Template]]] = {}  # by ball, no neighbours
         self._drawn: dict[Wanted, Template] = {}
+        self._looks: Looks = (0, 0, 0, Light())
         self._take_up(Appearance())
 
     def serve(self, ball: int, view: Sequence[float], appearance: Appearance) -> tuple[Template, Template]:
@@ -54,16 +61,20 @@ class Album:
         """
         if appearance is not self._appearance:
             self._take_up(appearance)
-        radius_px, (luma_steps, chroma_steps, box_px, shown) = view[RADIUS], self._looks
-        x_steps = y_steps = 0
-        if shown.count:
-            x_steps, y_steps = round(view[RAY_X] / BEARING_STEP_RAD), round(view[RAY_Y] / BEARING_STEP_RAD)
-        radius_steps = round(radius_px / RADIUS_STEP_PX)
-        steps = radius_steps, x_steps, y_steps, radius_px < SMALL_PX, self._looks
+        radius_px, ray_x, ray_y = view[RADIUS], view[RAY_X], view[RAY_Y]
+        x_steps, y_steps = (round(ray_x / BEARING_STEP_RAD), round(ray_y / BEARING_STEP_RAD)) if self._lit else (0, 0)
+        steps = round(radius_px / RADIUS_STEP_PX), x_steps, y_steps, radius_px < SMALL_PX
         before = self._as_wanted.get(ball)
         if before is not None and before[0] == steps:
             return before[1]
-        bearing = x_steps, y_steps
+        return self._look_up(ball, steps, view, appearance)
+
+    def _look_up(
+        self, ball: int, steps: Steps, view: Sequence[float], appearance: Appearance
+    ) -> tuple[Template, Template]:
+        """Return the templates for these steps, and note them if they are no neighbours."""
+        (radius_steps, x_steps, y_steps, _), (luma_steps, chroma_steps, box_px, shown) = steps, self._looks
+        radius_px, bearing = view[RADIUS], (x_steps, y_steps)
         luma = Wanted(radius_steps, luma_steps, *bearing, 1, sampling_of(radius_px, 1), shown)
         chroma = Wanted(radius_steps, chroma_steps, *bearing, box_px, sampling_of(radius_px, box_px), shown)
         slots = (ball, 0), (ball, 1)
@@ -77,7 +88,10 @@ class Album:
         r = appearance.response
         _, luma_steps = steps_of(0.0, r.luma_px)
         _, chroma_steps = steps_of(0.0, r.chroma_px)
-        self._appearance, self._looks = appearance, (luma_steps, chroma_steps, r.block_px, appearance.shown)
+        looks = luma_steps, chroma_steps, r.block_px, appearance.shown
+        if looks != self._looks:
+            self._as_wanted.clear()
+        self._appearance, self._looks, self._lit = appearance, looks, appearance.shown.count > 0
 
     def _template(
         self, slot: tuple[int, int], wanted: Wanted, view: Sequence[float], appearance: Appearance

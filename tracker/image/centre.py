@@ -11,26 +11,17 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from enum import Enum, auto
 
 import numpy as np
 
-from tracker.image import newton
 from tracker.image.evidence import LEAST_EVIDENCE
-from tracker.image.newton import gauss_newton, squares_at
+from tracker.image.newton import FIT_SIZE, gauss_newton, squares_at
 from tracker.image.patch import Expected, Patch, cut, extent_of, fits_in
-from tracker.image.reading import CHROMA_VAR, LUMA_VAR
+from tracker.image.reading import LUMA_VAR
 from tracker.image.template import Template, template_for, variance_of
 from tracker.types import Array, Image, Reason, frozen_array
 
 MAX_SHIFT_PX = 1.5
-
-
-class Group(Enum):
-    """What is blurred alike."""
-
-    BRIGHTNESS = auto()
-    COLOUR = auto()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,10 +66,9 @@ def fit_centre(image: Image, ball: Expected) -> Centre | Reason:
     extent = extent_of(ball)
     if not fits_in(image, extent):
         return Reason.AT_BORDER
-    patch, fit = cut(image, extent, ball.response), np.empty(newton.FIT_SIZE)
+    patch, fit = cut(image, extent, ball.response), np.empty(FIT_SIZE)
     luma, chroma = templates_of(ball)
-    drawn = luma.fine, luma.made, chroma.fine, chroma.made
-    gauss_newton(patch.bright, patch.colour, *drawn, numbers_of(ball), extent.du, extent.dv, fit)
+    gauss_newton(patch.bright, patch.colour, *luma, *chroma, numbers_of(ball), extent.du, extent.dv, fit)
     du, dv, cov_uu, cov_uv, cov_vv, misfit, evidence = fit.tolist()
     if not (math.hypot(du - extent.du, dv - extent.dv) <= MAX_SHIFT_PX and evidence >= LEAST_EVIDENCE):
         return Reason.NO_BALL
@@ -93,20 +83,3 @@ def misfit_at(patch: Patch, ball: Expected, centre: tuple[float, float]) -> floa
     """
     luma, _ = templates_of(ball)
     return squares_at(patch.bright, luma.fine, luma.made, numbers_of(ball), LUMA_VAR, *centre)
-
-
-def slopes_at(patch: Patch, ball: Expected, centre: tuple[float, float], group: Group) -> tuple[Array, float]:
-    """Return how a ball's fit at a given centre changes with what it was given.
-
-    Args:
-        centre: from the patch's middle pixel [px].
-        group: the pixels that are looked at.
-    Returns:
-        slopes (2, n) of the brightness, or of the blue difference, by the centre [1/px]; and that of half the sum of
-        squares left, by the variance of the blur [1/px^2]: positive when a sharper ball would fit better.
-    """
-    bright = group is Group.BRIGHTNESS
-    pixels, template = (patch.bright if bright else patch.colour), templates_of(ball)[0 if bright else 1]
-    slopes, variance = np.empty((2, pixels.shape[1])), LUMA_VAR if bright else CHROMA_VAR
-    by_variance = newton.slopes_at(pixels, template.fine, template.made, numbers_of(ball), variance, *centre, slopes)
-    return slopes, by_variance

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,7 @@ FIXED_POINT = 12  # bits behind the point in OpenCV's 8-bit HSV
 NEVER = LEVELS  # a spread that no pixel has
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class ColourTable:
+class ColourTable(NamedTuple):  # spread out into compiled calls
     """The colours of n balls, a row each, prepared for `tracker.image.detect`.
 
     A pixel has a colour when the spread between its largest and least channel is at least that of its largest
@@ -40,20 +39,14 @@ def colours_of(balls: tuple[Ball, ...], gains: Gains = NEUTRAL) -> ColourTable:
     return _in_light(balls, blue, red)
 
 
-def colours_of_each(balls: tuple[Ball, ...], gains: Gains) -> tuple[ColourTable, ...]:
-    """Return a table of each ball's colour alone."""
-    blue, red = gains.undoing
-    return _each_in_light(balls, blue, red)
-
-
-@lru_cache(maxsize=256)
-def _each_in_light(balls: tuple[Ball, ...], blue: int, red: int) -> tuple[ColourTable, ...]:
-    return tuple(_in_light((ball,), blue, red) for ball in balls)
+def colours_of_each(balls: tuple[Ball, ...], undoing: tuple[int, int]) -> tuple[ColourTable, ...]:
+    """Return a table of each ball's colour alone, in a light that is undone so."""
+    return tuple(_in_light((ball,), *undoing) for ball in balls)
 
 
 @lru_cache(maxsize=1024)
 def _in_light(balls: tuple[Ball, ...], blue: int, red: int) -> ColourTable:
-    return replace(_tables(balls), blue=blue, red=red)
+    return _tables(balls)._replace(blue=blue, red=red)
 
 
 @lru_cache(maxsize=64)

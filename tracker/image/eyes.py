@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from tracker.image.album import Album
-from tracker.image.appearance import MISFIT_MAX
-from tracker.image.look import Fitted, Look, look_near
+from tracker.image.appearance import MISFIT_MAX, Appearance
+from tracker.image.look import Fitted, Look, gaze_of, look_near
 from tracker.image.rivals import first_rivals
 from tracker.image.sight import MISFIT
 from tracker.image.tint import Bgr, Gains, Tint, core_colour
@@ -27,7 +29,7 @@ LONG_STREAK_PX = 0.7  # an image smeared further than this, taken for a still on
 class Eyes:
     """What each camera of a rig knows of how balls look to it.
 
-    doubts_px: by camera, by how much all centres may be wrong together for what is not known, one sigma [px].
+    doubts_px: (cameras,) by how much all centres may be wrong together for what is not known, one sigma [px].
     """
 
     def __init__(self, rig: Rig) -> None:
@@ -35,15 +37,19 @@ class Eyes:
         self._rivals = [first_rivals() for _ in rig.cameras]
         self._albums = [Album(camera) for camera in rig.cameras]
         self._tints = [Tint() for _ in rig.cameras]
+        self._gazes = [gaze_of(rig, Appearance(), album) for album in self._albums]
         self._turn = 0
         self._taught_blindly = False
         self._sum_up()
 
     def _sum_up(self) -> None:
         """Take note of what is known by now: asked for in every round, it changes with lessons alone."""
-        self._appearances = [rivals.best for rivals in self._rivals]
-        self._exposures_s = tuple([appearance.response.exposure_s for appearance in self._appearances])
-        self.doubts_px = tuple([rivals.doubt_px for rivals in self._rivals])
+        appearances = [rivals.best for rivals in self._rivals]
+        for index, appearance in enumerate(appearances):
+            if self._gazes[index].appearance is not appearance:
+                self._gazes[index] = self._gazes[index].at_such(appearance)
+        self._exposures_s = tuple([appearance.response.exposure_s for appearance in appearances])
+        self.doubts_px = np.array([rivals.doubt_px for rivals in self._rivals])
         self._gamma_known = all(rivals.settled for rivals in self._rivals)
         enough = all(rivals.count >= LEARN_ALL for rivals in self._rivals)
         self._settled = self._gamma_known and enough  # how balls look is known, so that little is left to learn
@@ -73,14 +79,21 @@ class Eyes:
 
     def suppose(self, gains: Sequence[Gains]) -> None:
         """Take the light in each camera to be so."""
-        self._tints = [replace(tint, gains=one) for tint, one in zip(self._tints, gains, strict=True)]
+        for index, one in enumerate(gains):
+            self._light_up(index, replace(self._tints[index], gains=one))
+
+    def _light_up(self, index: int, tint: Tint) -> None:
+        """Take the light in one camera to be so; the colours looked for change in few, large steps."""
+        self._tints[index], gaze = tint, self._gazes[index]
+        if tint.gains.undoing != gaze.undoing:
+            self._gazes[index] = gaze_of(self._rig, gaze.appearance, gaze.album, tint.gains)
 
     def look(self, frames: Sequence[Frame], state: State) -> Look:
         """Find each ball in each image where a state expects it."""
         whose = frames[self._turn % len(frames)].camera  # of those that see now: free-running ones are a round each
         for index, album in enumerate(self._albums):
             album.draws_left = int(index == whose) if self._settled else None
-        look = look_near(frames, self._rig, state, self._appearances, self._albums, self.gains)
+        look = look_near(frames, self._rig, state, self._gazes)
         smear_px = self._smear_px(state)
         look.blind = smear_px > BLIND_PX
         return look.doubted(SMEAR_DOUBT * smear_px) if look.blind else look
@@ -124,7 +137,8 @@ class Eyes:
         for camera in cameras:
             seen = [one for one in fitted if one.frame.camera == camera and float(one.fit[MISFIT]) <= MISFIT_MAX]
             if len(seen) >= LIGHT_BALLS:
-                self._tints[camera] = self._tints[camera].learned([(one.sighting.ball, _colour(one)) for one in seen])
+                colours = [(one.sighting.ball, _colour(one)) for one in seen]
+                self._light_up(camera, self._tints[camera].learned(colours))
 
 
 def _colour(one: Fitted) -> Bgr:

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.image.centre import Group, misfit_at, numbers_of, slopes_at, templates_of
+from tracker.image.centre import numbers_of, templates_of
+from tracker.image.newton import slopes_at, squares_at
 from tracker.image.patch import LUMA, TRUST, Expected, Patch, Response, X, Y
-from tracker.image.reading import CHROMA_VAR, LUMA_VAR, read
+from tracker.image.reading import CHROMA_VAR, LUMA_VAR, STREAK_U, STREAK_V, read
 from tracker.image.robust import without_strangers
-from tracker.image.template import COARSE, GLOSS, TERMS, Vector, draw, every_term, steps_of
+from tracker.image.template import COARSE, GLOSS, TERMS, Template, Vector, draw, every_term, steps_of
 from tracker.maths.compiled import compiled
 from tracker.maths.solve import cholesky, dot, eliminate, solve
 from tracker.types import Array
@@ -31,6 +33,7 @@ class Sample:
     """One ball's pixels, with what was known of it and where its fit put it.
 
     patch: trusts those less that fit no ball.
+    numbers: see `reading.BALL_SIZE`.  luma: the template of its brightness.
     centre: from the patch's middle pixel [px].
     slopes (2, n): of its brightness, as fitted, by the centre [1/px].
     sharper_luma, sharper_chroma: whether its brightness and its colour would fit better with less blur.
@@ -38,6 +41,8 @@ class Sample:
 
     patch: Patch
     ball: Expected
+    numbers: Array
+    luma: Template
     centre: tuple[float, float]
     slopes: Array
     sharper_luma: bool
@@ -45,14 +50,30 @@ class Sample:
 
 
 def sample_of(patch: Patch, ball: Expected, centre: tuple[float, float]) -> Sample:
-    """Look at a fitted ball again, and past what is in front of it or beside it."""
+    """Look at a fitted ball again, and past what is in front of it or beside it. The patch is used up."""
     numbers, (luma, chroma) = numbers_of(ball), templates_of(ball)
-    bright = without_strangers(patch.bright, luma.fine, luma.made, numbers, LUMA_VAR, *centre)
-    colour = without_strangers(patch.colour, chroma.fine, chroma.made, numbers, CHROMA_VAR, *centre)
-    patch = Patch(bright, colour)
-    slopes, by_luma = slopes_at(patch, ball, centre, Group.BRIGHTNESS)
-    _, by_chroma = slopes_at(patch, ball, centre, Group.COLOUR)
-    return Sample(patch, ball, centre, slopes, by_luma > 0.0, by_chroma > 0.0)
+    slopes = np.empty((2, patch.bright.shape[1]))
+    by_luma, by_chroma = _look_again(patch.bright, patch.colour, *luma, *chroma, numbers, *centre, slopes)
+    return Sample(patch, ball, numbers, luma, centre, slopes, by_luma > 0.0, by_chroma > 0.0)
+
+
+@compiled(
+    "UniTuple(f8, 2)(f8[:, ::1], f8[:, ::1], Array(f4, 3, 'C', True), f8[::1], Array(f4, 3, 'C', True), f8[::1],"
+    "f8[::1], f8, f8, f8[:, ::1])"
+)
+def _look_again(
+    bright: Array, colour: Array, luma: NDArray[np.float32], luma_made: Array, chroma: NDArray[np.float32],
+    chroma_made: Array, ball: Array, u: float, v: float, slopes: Array,
+) -> tuple[float, float]:  # fmt: skip
+    """Trust those pixels less that fit no ball with its centre at (u, v); return what `slopes_at` does of both.
+
+    slopes (2, n): of the brightness, filled in.
+    """
+    bright[TRUST] = without_strangers(bright, luma, luma_made, ball, LUMA_VAR, u, v)[TRUST]
+    colour[TRUST] = without_strangers(colour, chroma, chroma_made, ball, CHROMA_VAR, u, v)[TRUST]
+    by_luma = slopes_at(bright, luma, luma_made, ball, LUMA_VAR, u, v, slopes)
+    by_chroma = slopes_at(colour, chroma, chroma_made, ball, CHROMA_VAR, u, v, np.empty((2, colour.shape[1])))
+    return by_luma, by_chroma
 
 
 def sharper(sample: Sample, step_px: float) -> Response:
@@ -60,22 +81,24 @@ def sharper(sample: Sample, step_px: float) -> Response:
     ball, now = sample.ball, sample.ball.response
     luma_px, chroma_px, exposure_s = now.luma_px, now.chroma_px, now.exposure_s
     if math.hypot(*ball.speed_px_s) * EXPOSURE_TRIAL_S > LEAST_STREAK_PX:
-        shorter = _shorter(sample.patch, ball, sample.centre)
-        exposure_s = _stepped(exposure_s, shorter, step_px * EXPOSURE_S_PX, EXPOSURE_MAX_S)
+        exposure_s = _stepped(exposure_s, _shorter(sample), step_px * EXPOSURE_S_PX, EXPOSURE_MAX_S)
     if math.hypot(*ball.streak_px) < SMEARED_PX:
         luma_px = _stepped(luma_px, sample.sharper_luma, step_px, BLUR_MAX_PX)
         chroma_px = _stepped(chroma_px, sample.sharper_chroma, step_px, BLUR_MAX_PX)
     return Response(luma_px, chroma_px, exposure_s, now.gamma, now.detail)
 
 
-def _shorter(patch: Patch, ball: Expected, centre: tuple[float, float]) -> bool:
+def _shorter(sample: Sample) -> bool:
     """Say whether the ball fits better under a shorter exposure than under a longer one."""
-    now = ball.response
-    shorter, longer = (
-        replace(ball, response=replace(now, exposure_s=max(0.0, now.exposure_s + trial_s)))
-        for trial_s in (-EXPOSURE_TRIAL_S, EXPOSURE_TRIAL_S)
-    )
-    return misfit_at(patch, shorter, centre) < misfit_at(patch, longer, centre)
+    now_s = sample.ball.response.exposure_s
+    return _misfit(sample, max(0.0, now_s - EXPOSURE_TRIAL_S)) < _misfit(sample, now_s + EXPOSURE_TRIAL_S)
+
+
+def _misfit(sample: Sample, exposure_s: float) -> float:
+    """Return the sum of squares that the ball's fit leaves in its brightness under another exposure."""
+    numbers, (speed_u, speed_v) = sample.numbers.copy(), sample.ball.speed_px_s
+    numbers[STREAK_U], numbers[STREAK_V] = speed_u * exposure_s, speed_v * exposure_s
+    return squares_at(sample.patch.bright, *sample.luma, numbers, LUMA_VAR, *sample.centre)
 
 
 def _stepped(now: float, less: bool, step: float, most: float) -> float:
@@ -139,7 +162,13 @@ def light_on(sample: Sample, lamp: Vector) -> tuple[Array, Array] | None:
         information (TERMS, TERMS), target (TERMS,) for `Light.learned`; None for a ball without brightness of its own.
     """
     ball, pixels = sample.ball, sample.patch.bright
-    template = draw(*steps_of(ball.radius_px, ball.response.luma_px), 1, COARSE, every_term(lamp))
-    information, target, drawn = np.empty((TERMS, TERMS)), np.empty(TERMS), (template.fine, template.made)
-    mean = _equations(*drawn, numbers_of(ball), pixels, *sample.centre, sample.slopes, information, target)
+    template = _terms_of(*steps_of(ball.radius_px, ball.response.luma_px), lamp)
+    information, target = np.empty((TERMS, TERMS)), np.empty(TERMS)
+    mean = _equations(*template, sample.numbers, pixels, *sample.centre, sample.slopes, information, target)
     return (information * mean**2, target * mean) if mean > 0.0 else None
+
+
+@lru_cache(maxsize=64)
+def _terms_of(radius_steps: int, blur_steps: int, lamp: Vector) -> Template:
+    """Return the terms themselves, drawn; what all of them are asked for by would take long to compare."""
+    return draw(radius_steps, blur_steps, 1, COARSE, every_term(lamp))

@@ -15,7 +15,7 @@ import numpy as np
 
 from tracker.image.template import GLOSS, TERMS, Shades, Vector
 from tracker.maths.compiled import compiled
-from tracker.maths.solve import cholesky, solve
+from tracker.maths.solve import cholesky, dot, solve
 from tracker.types import Array
 
 FORGETTING = 0.99  # a ball: the light of about the last hundred counts
@@ -55,11 +55,8 @@ class Light:
                 the lamp of `lamp_seen`, scaled to mean brightness 1.
             R_RtoW: (3, 3) turns the ray's frame into the room.
         """
-        after, aim = FORGETTING * self.information, FORGETTING * self.target
-        terms = _with_one_more(after, aim, information, target, np.ascontiguousarray(R_RtoW), RIDGE)
-        pull = terms[1:4] + terms[4:7]
-        length = float(np.linalg.norm(terms[4:7]))
-        lamp = np.asarray(terms[4:7] / length) if length > 0.0 and float(pull @ terms[4:7]) > 0.0 else self.lamp
+        after, aim, lamp = self.information.copy(), self.target.copy(), self.lamp.copy()
+        terms = _with_one_more(after, aim, information, target, R_RtoW, lamp)
         return Light(lamp, terms, after, aim, self.count + 1)
 
     def faded(self) -> Light:
@@ -68,8 +65,7 @@ class Light:
 
     def lamp_seen(self, R_RtoW: Array) -> Vector:
         """Return the lamp's direction in a ray's frame, rounded."""
-        x, y, z = np.round(R_RtoW.T @ self.lamp * LAMP_STEPS) / LAMP_STEPS
-        return float(x), float(y), float(z)
+        return _rounded(R_RtoW, self.lamp)
 
     def shades(self, R_RtoW: Array) -> Shades:
         """Return the shapes of a ball seen along a ray: coverage, that times the light, the lamp's mirror image."""
@@ -79,22 +75,35 @@ class Light:
         return Shades(self.lamp_seen(R_RtoW), (COVERAGE, matt, MIRROR))
 
 
+@compiled("UniTuple(f8, 3)(f8[:, ::1], f8[::1])")
+def _rounded(R_RtoW: Array, lamp: Array) -> Vector:
+    """Return what `Light.lamp_seen` does."""
+    x = y = z = 0.0
+    for i in range(3):
+        x, y, z = x + R_RtoW[i, 0] * lamp[i], y + R_RtoW[i, 1] * lamp[i], z + R_RtoW[i, 2] * lamp[i]
+    return round(x * LAMP_STEPS) / LAMP_STEPS, round(y * LAMP_STEPS) / LAMP_STEPS, round(z * LAMP_STEPS) / LAMP_STEPS
+
+
 @compiled("f8[::1](f8[:, ::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[::1])")
-def _with_one_more(information: Array, target: Array, more: Array, aim: Array, R_RtoW: Array, ridge: Array) -> Array:
-    """Add one ball's normal equations, turned into the room, in place; return the terms that solve them."""
+def _with_one_more(information: Array, target: Array, more: Array, aim: Array, R_RtoW: Array, lamp: Array) -> Array:
+    """Add one ball's normal equations, turned into the room, and turn the lamp, in place; return the terms."""
     turn = np.eye(TERMS)
     turn[1:4, 1:4] = R_RtoW
     turn[4:7, 4:7] = R_RtoW
-    information += turn @ more @ turn.T
-    target += turn @ aim
+    information[:] = FORGETTING * information + turn @ more @ turn.T
+    target[:] = FORGETTING * target + turn @ aim
     factor, terms = information.copy(), target.copy()
     for i in range(TERMS):
-        factor[i, i] += ridge[i] * information[0, 0] + 1e-9
+        factor[i, i] += RIDGE[i] * information[0, 0] + 1e-9
     cholesky(factor)
     solve(factor, terms)
+    length, pull = math.sqrt(dot(terms[4:7], terms[4:7])), dot(terms[1:4] + terms[4:7], terms[4:7])
+    if length > 0.0 and pull > 0.0:
+        lamp[:] = terms[4:7] / length
     return terms
 
 
+@compiled("f8[:, ::1](f8, f8, Array(f8, 2, 'A', readonly=True))")
 def ray_frame(x: float, y: float, R_CtoW: Array) -> Array:
     """Return R_RtoW (3, 3) of the frame in which a ball's image is drawn, seen along the ray (x, y, 1).
 
@@ -103,5 +112,10 @@ def ray_frame(x: float, y: float, R_CtoW: Array) -> Array:
     flat, whole = math.sqrt(1.0 + x * x), math.sqrt(1.0 + x * x + y * y)
     both = flat * whole
     right, down = (1.0 / flat, 0.0, -x / flat), (-x * y / both, flat * flat / both, -y / both)
-    back = -x / whole, -y / whole, -1.0 / whole
-    return np.asarray(R_CtoW @ np.array((right, down, back)).T)
+    back, R_RtoW = (-x / whole, -y / whole, -1.0 / whole), np.zeros((3, 3))
+    for i in range(3):
+        for k in range(3):
+            R_RtoW[i, 0] += R_CtoW[i, k] * right[k]
+            R_RtoW[i, 1] += R_CtoW[i, k] * down[k]
+            R_RtoW[i, 2] += R_CtoW[i, k] * back[k]
+    return R_RtoW

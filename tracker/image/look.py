@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -12,10 +13,10 @@ from tracker.camera import Camera
 from tracker.image.album import Album
 from tracker.image.appearance import Appearance
 from tracker.image.centre import Centre
-from tracker.image.colour_table import colours_of_each
+from tracker.image.colour_table import ColourTable, colours_of_each
 from tracker.image.detect import Blob, find_blobs
 from tracker.image.patch import Expected
-from tracker.image.sight import COV, MISFIT, SIZE, SPOT, UV, find_ball, known_of
+from tracker.image.sight import COV, MISFIT, SIZE, SPOT, UV, Known, find_ball, known_of
 from tracker.image.template import Template
 from tracker.image.tint import NEUTRAL, Gains
 from tracker.image.view import DEPTH, RADIUS, RAY_X, RAY_Y, SPEED_U, SPEED_V, U, V, expected_views
@@ -26,8 +27,7 @@ from tracker.types import Array, BallSighting, Frame, Reason, Rejected, frozen_a
 NEAREST_M = 0.3  # a ball closer to a camera than this is not looked for
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Fitted:
+class Fitted(NamedTuple):  # as `BallSighting`
     """A sighting, and what `Appearance` learns from.
 
     view: a row of `view.expected_views`.  fit (sight.SIZE,): what was found.
@@ -73,60 +73,76 @@ class Look:
     def doubted(self, sigma_px: float) -> Look:
         """Return it with sightings that are less sure, by one sigma on each axis [px]."""
         more = sigma_px**2 * np.eye(2)
-        doubted = (replace(one.sighting, cov_px=frozen_array(one.sighting.cov_px + more)) for one in self.fitted)
-        fitted = [replace(one, sighting=sighting) for one, sighting in zip(self.fitted, doubted, strict=True)]
+        doubted = (one.sighting._replace(cov_px=frozen_array(one.sighting.cov_px + more)) for one in self.fitted)
+        fitted = [one._replace(sighting=sighting) for one, sighting in zip(self.fitted, doubted, strict=True)]
         return Look(fitted, self.rejections, self.blind)
 
 
-def look_near(
-    frames: Sequence[Frame],
-    rig: Rig,
-    state: State,
-    appearances: Sequence[Appearance],
-    albums: Sequence[Album],
-    gains: Sequence[Gains] = (),
-) -> Look:
+@dataclass(frozen=True, slots=True, eq=False)
+class Gaze:
+    """What one camera looks for: balls as they look to it now.
+
+    known, colours: of the camera and of each ball, as compiled code takes them.  album: their templates.
+    undoing: the colour of the light that is undone, see `Gains.undoing`.
+    """
+
+    appearance: Appearance
+    known: Known
+    colours: tuple[ColourTable, ...]
+    album: Album
+    undoing: tuple[int, int]
+
+    def at_such(self, appearance: Appearance) -> Gaze:
+        """Return it for balls that look so."""
+        return Gaze(appearance, known_of(appearance.response), self.colours, self.album, self.undoing)
+
+
+def gaze_of(rig: Rig, appearance: Appearance, album: Album, gains: Gains = NEUTRAL) -> Gaze:
+    """Return what a camera looks for to which balls look so, in a light of this colour."""
+    undoing = gains.undoing
+    return Gaze(appearance, known_of(appearance.response), colours_of_each(rig.marker.balls, undoing), album, undoing)
+
+
+def look_near(frames: Sequence[Frame], rig: Rig, state: State, gazes: Sequence[Gaze]) -> Look:
     """Find each ball in each image, in the region where a state, with its covariance, expects it.
 
     Args:
         frames: of different cameras, at about one time.
         state: carried to about that time.
-        appearances, albums: how balls look to each camera of the rig, and their templates.
-        gains: of the light in each camera; none for the config's light.
+        gazes: of each camera of the rig.
     """
     look = Look()
     for frame in frames:
-        c = frame.camera
-        _find_balls(frame, rig, state, appearances[c], albums[c], gains[c] if gains else NEUTRAL, look)
+        _find_balls(frame, rig, state, gazes[frame.camera], look)
     return look
 
 
-def _find_balls(
-    frame: Frame, rig: Rig, state: State, appearance: Appearance, album: Album, gains: Gains, look: Look
-) -> None:
+def _find_balls(frame: Frame, rig: Rig, state: State, gaze: Gaze, look: Look) -> None:
     """Add each ball of the marker as seen in one image near its prediction, or why it is not."""
-    image, camera, t_ns, balls = frame.image, frame.camera, frame.t_ns, rig.marker.balls
-    eye = rig.cameras[camera]
-    rows, known, colours = (
-        expected_views(state, rig, camera, t_ns), known_of(appearance.response), colours_of_each(balls, gains)
-    )  # fmt: skip
+    image, camera, t_ns, appearance = frame.image, frame.camera, frame.t_ns, gaze.appearance
+    known, colours, serve, eye = gaze.known, gaze.colours, gaze.album.serve, rig.cameras[camera]
+    rows = expected_views(state, rig, camera, t_ns)
     fits = np.empty((len(rows), SIZE))
     fixed = fits.view()
     fixed.flags.writeable = False
     uvs_px, covs_px2 = fixed[:, UV], fixed[:, COV].reshape(-1, 2, 2)
     for b, view in enumerate(rows.tolist()):
         if not (math.isfinite(view[U]) and math.isfinite(view[V]) and view[DEPTH] >= NEAREST_M):
-            look.rejections.append(Rejected(Reason.BEHIND, f"{balls[b].name} is not before the camera", t_ns, camera))
+            look.rejections.append(Rejected(Reason.BEHIND, f"{_name(rig, b)} is not before the camera", t_ns, camera))
             continue
-        drawn = album.serve(b, view, appearance)
+        drawn = serve(b, view, appearance)
         failed = find_ball(image, colours[b], rows[b], known, drawn, fits[b])
         if failed is None:
             row_ns = t_ns + round(eye.delay_ns(fits[b, UV][1])) if eye.readout_ns else t_ns
             sighting = BallSighting(camera, b, row_ns, uvs_px[b], covs_px2[b])
             look.fitted.append(Fitted(sighting, frame, view, fixed[b], appearance, drawn))
         else:
-            detail = f"no {balls[b].name} at ({view[U]:.0f}, {view[V]:.0f}) px, where it is expected"
+            detail = f"no {_name(rig, b)} at ({view[U]:.0f}, {view[V]:.0f}) px, where it is expected"
             look.rejections.append(Rejected(failed, detail, t_ns, camera))
+
+
+def _name(rig: Rig, ball: int) -> str:
+    return rig.marker.balls[ball].name
 
 
 def look_everywhere(frame: Frame, camera: Camera, rig: Rig, gains: Gains = NEUTRAL) -> list[list[Blob]]:

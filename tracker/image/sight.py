@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +37,6 @@ Known = tuple[Array, int, Array, Array]
 """Of a camera: variances of its blurs [px^2] and exposure [s], side of its blocks, light and trust of grey levels."""
 
 
-@lru_cache(maxsize=64)
 def known_of(response: Response) -> Known:
     """Return how a camera answers to light, as compiled code takes it."""
     block = response.block_px
@@ -63,10 +61,7 @@ def find_ball(
         cut off.
     """
     luma, chroma = drawn
-    status = _find_and_fit(
-        image, colour.least_spread, colour.lowest_spread, colour.hues, colour.blue, colour.red, view, *known, luma.fine,
-        luma.made, chroma.fine, chroma.made, fit,
-    )  # fmt: skip
+    status = _find_and_fit(image, *colour, view, *known, *luma, *chroma, fit)
     return None if status == _FOUND else _REASONS[status]
 
 

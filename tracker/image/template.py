@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import cv2
 import numpy as np
@@ -57,8 +58,7 @@ def every_term(lamp: Vector) -> Shades:
     return Shades(lamp, _UNITS)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Template:
+class Template(NamedTuple):  # spread out into compiled calls
     """Shapes on a grid of 1 / per_px pixel.
 
     fine: (size, size, p), rows are v; the ball's centre is in the middle, the rim and all beyond it empty.

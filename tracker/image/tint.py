@@ -60,15 +60,12 @@ class Tint:
     gains: now.
     colours: by ball, sums of weight, log(blue / green) weighted and log(red / green) weighted, gains undone, and how
         often it was seen: the ball's own colour.
+    settled: whether the own colour of every ball seen so far is known.
     """
 
     gains: Gains = NEUTRAL
     colours: Mapping[int, tuple[float, float, float, int]] = field(default_factory=dict)
-
-    @property
-    def settled(self) -> bool:
-        """Say whether the own colour of every ball seen so far is known."""
-        return bool(self.colours) and all(count >= LEARN_BALLS for *_, count in self.colours.values())
+    settled: bool = False
 
     def learned(self, seen: Sequence[tuple[int, Bgr]]) -> Tint:
         """Return what is known after one image.
@@ -77,25 +74,29 @@ class Tint:
             seen: ball and mean colour of its core, from `core_colour`, for each ball well fitted.
         """
         here = math.log(self.gains.blue), math.log(self.gains.red)
-        colours = dict(self.colours)
+        learned = {}
         pull = pull_blue = pull_red = 0.0
         for ball, bgr in seen:
             ratios = _ratios(bgr)
             if ratios is None:
                 continue
             weight, blue, red = ratios
-            total, sum_blue, sum_red, count = colours.get(ball, (0.0, 0.0, 0.0, 0))
+            total, sum_blue, sum_red, count = self.colours.get(ball, (0.0, 0.0, 0.0, 0))
             if count < LEARN_BALLS:
                 own_blue, own_red = blue - here[0], red - here[1]
-                colours[ball] = total + weight, sum_blue + weight * own_blue, sum_red + weight * own_red, count + 1
+                learned[ball] = total + weight, sum_blue + weight * own_blue, sum_red + weight * own_red, count + 1
             else:
                 pull += weight
                 pull_blue += weight * (blue - sum_blue / total)
                 pull_red += weight * (red - sum_red / total)
+        colours, settled = self.colours, self.settled
+        if learned:
+            colours = {**colours, **learned}
+            settled = all(count >= LEARN_BALLS for *_, count in colours.values())
         if pull == 0.0:
-            return Tint(self.gains, colours)
+            return Tint(self.gains, colours, settled)
         now = _followed(here[0], pull_blue / pull), _followed(here[1], pull_red / pull)
-        return Tint(Gains(math.exp(now[0]), math.exp(now[1])), colours)
+        return Tint(Gains(math.exp(now[0]), math.exp(now[1])), colours, settled)
 
     def other(self, number: int) -> Gains:
         """Return a light near the known one, to look for balls under when none are found.

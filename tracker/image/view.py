@@ -95,8 +95,8 @@ def _views(
     return views
 
 
-@compiled("f8(UniTuple(f8, 3), f8[:, ::1], f8[:, ::1], f8[::1], f8)")
-def _smear(p_BinW: tuple[float, float, float], P: Array, table: Array, seconds_by_px: Array, reach_m: float) -> float:
+@compiled("f8(f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8)")
+def _smear(mean: Array, P: Array, table: Array, seconds_by_px: Array, reach_m: float) -> float:
     """Return the largest of the cameras' streaks, see `unknown_streak_px`."""
     variance, streak_px = 0.0, 0.0
     for i in range(3):
@@ -104,7 +104,7 @@ def _smear(p_BinW: tuple[float, float, float], P: Array, table: Array, seconds_b
     for c in range(len(table)):
         distance2 = 0.0
         for i in range(3):
-            distance2 += (p_BinW[i] - table[c, 21 + i]) ** 2
+            distance2 += (mean[i] - table[c, 21 + i]) ** 2
         streak_px = max(streak_px, math.sqrt(variance / distance2) * seconds_by_px[c])
     return streak_px
 
@@ -127,5 +127,4 @@ def unknown_streak_px(state: State, rig: Rig, exposures_s: tuple[float, ...]) ->
 
     exposures_s: of each camera.
     """
-    x, y, z = state.p_BinW.tolist()
-    return _smear((x, y, z), state.P, camera_table(rig), _seconds_by_px(rig, exposures_s), _reach_m(rig))
+    return _smear(state.mean, state.P, camera_table(rig), _seconds_by_px(rig, exposures_s), _reach_m(rig))

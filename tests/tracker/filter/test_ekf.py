@@ -111,7 +111,7 @@ def test_a_second_of_one_camera_and_one_hidden_ball_costs_accuracy_and_not_the_t
 
 
 def lie(seen: tuple[BallSighting, ...], index: int, shift_px: tuple[float, float]) -> tuple[BallSighting, ...]:
-    moved = replace(seen[index], uv_px=frozen_array(seen[index].uv_px + shift_px))
+    moved = seen[index]._replace(uv_px=frozen_array(seen[index].uv_px + shift_px))
     return (*seen[:index], moved, *seen[index + 1 :])
 
 
@@ -131,7 +131,7 @@ def test_one_false_sighting_is_left_out_and_the_rest_used(index: int, shift_px: 
 
 def test_two_colours_swapped_in_one_camera_are_left_out_and_the_rest_used() -> None:
     seen = sightings(FLYING, RIG, [(0, 0), (1, 0)], SIGMA_PX, np.random.default_rng(0))
-    swapped = (replace(seen[0], ball=1), replace(seen[1], ball=0), *seen[2:])
+    swapped = (seen[0]._replace(ball=1), seen[1]._replace(ball=0), *seen[2:])
     found = updated(update(FLYING, swapped, RIG, GATE))
     assert {(s.camera, s.ball) for s in found.used} == {(0, 2), (1, 0), (1, 1), (1, 2)}
     assert len(found.rejected) == 2
@@ -160,7 +160,7 @@ def test_a_camera_that_shows_what_it_saw_before_makes_no_pose_wrong(stale: int, 
         guess = updated(update(predict(guess, k * period_ns, PROCESS), seen, RIG, GATE)).state
     now_ns = 16 * period_ns
     views = [(camera, now_ns - period_ns * (camera == stale)) for camera in (0, 1)]
-    seen = tuple(replace(s, t_ns=now_ns) for s in sightings(truth, RIG, views, SIGMA_PX, rng))
+    seen = tuple(s._replace(t_ns=now_ns) for s in sightings(truth, RIG, views, SIGMA_PX, rng))
     found = update(predict(guess, now_ns, PROCESS), seen, RIG, GATE)
     if isinstance(found, Update):
         error = difference(at(truth, now_ns), found.state)[:6]

@@ -12,18 +12,19 @@ from tests.tracker.paper_rig import paper_rig
 from tests.tracker.rigs import covariance, perturbed, seen_px, state
 from tracker.image.album import Album
 from tracker.image.appearance import Appearance
-from tracker.image.look import look_everywhere, look_near
+from tracker.image.look import gaze_of, look_everywhere, look_near
 from tracker.image.patch import Response
 from tracker.state import State
 from tracker.types import BallSighting, Frame, Reason, Rejected
 
 RIG = paper_rig()
 FLYING = state(0, (0.2, -0.1, 0.1), (12.0, -8.0, 130.0), (0.5, 0.5, 0.2), (0.3, 0.2, 1.0))
-SHARP = [Appearance(Response(0.25, 0.25, detail=1.0))] * 2
+SHARP = Appearance(Response(0.25, 0.25, detail=1.0))
 
 
 def look(image: Frame, expected: State) -> tuple[list[BallSighting], list[Rejected]]:
-    found = look_near([image], RIG, expected, SHARP, [Album(camera) for camera in RIG.cameras])
+    gazes = [gaze_of(RIG, SHARP, Album(camera)) for camera in RIG.cameras]
+    found = look_near([image], RIG, expected, gazes)
     return [fitted.sighting for fitted in found.fitted], list(found.rejections)
 
 
