@@ -7,8 +7,6 @@ from bisect import bisect_left
 from collections import deque
 from dataclasses import dataclass
 
-import numpy as np
-
 from bridge.telemetry.bins import Bins
 from bridge.wire import Sent
 from tracker.rig import Rig
@@ -59,8 +57,7 @@ class Gauges:
         self._state_ns = 0
         self.gap_ever_ns: int | None = None
         self._came_ns: deque[int] = deque(maxlen=MOST_IN_WINDOW)
-        self._recent_ns = np.zeros(RECENT, np.int64)  # a ring
-        self._datagrams = 0
+        self._recent_ns: deque[int] = deque(maxlen=RECENT)
         self._frame_ns = [0] * len(names.cameras)
         self._used_ns = [[0] * len(names.balls) for _ in names.cameras]
 
@@ -89,8 +86,7 @@ class Gauges:
         for record in sent:
             if record.available_ns:
                 latency_ns = record.sent_ns - record.available_ns
-                self._recent_ns[self._datagrams % RECENT] = latency_ns
-                self._datagrams += 1
+                self._recent_ns.append(latency_ns)
                 here.latency_ns = max(here.latency_ns, latency_ns)
 
     def move_on(self, now_ns: int) -> None:
@@ -137,12 +133,8 @@ class Gauges:
 
     def recent_ms(self, *shares: float) -> list[float | None]:
         """Return the latencies that these shares of the newest datagrams do not exceed, None without any [ms]."""
-        count = min(self._datagrams, RECENT)
-        if not count:
-            return [None for _ in shares]
-        places = [math.ceil(share * count) - 1 for share in shares]
-        found: list[int] = np.partition(self._recent_ns[:count], places)[places].tolist()
-        return [latency_ns / 1e6 for latency_ns in found]
+        rising_ns = sorted(self._recent_ns)
+        return [rising_ns[math.ceil(share * len(rising_ns)) - 1] / 1e6 if rising_ns else None for share in shares]
 
     def nis(self) -> tuple[float, int]:
         """Return the sums of NIS and of degrees of freedom over the window's updates."""
