@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +12,7 @@ from tests.system import flights
 from tests.system.flights import FIRST_S, FRAMES, RATE_HZ, Case, during
 from tools.bench.trial import Spoil
 from tracker.scene import Trouble
-from tracker.types import Event, Frame, Reason, Rejected
+from tracker.types import Event, Frame, Image, Reason, Rejected
 
 FIRST = round(FIRST_S * RATE_HZ)  # pair
 ONE_FRAME_S = FIRST_S + 0.5 / RATE_HZ
@@ -64,6 +64,34 @@ def stamped_ahead(events: list[Event]) -> Iterable[Event]:
         yield replace(event, t_ns=event.t_ns + 5_000_000_000) if k == 2 * FIRST + 1 else event
 
 
+def repeated(events: list[Event]) -> Iterable[Event]:
+    """Let every eleventh frame show what its camera saw before, as a buffer not filled in time does."""
+    return _spoiled(events, 11, lambda _, before: before.image)
+
+
+def torn(events: list[Event]) -> Iterable[Event]:
+    """Let the lower half of every eleventh frame show what its camera saw before."""
+    return _spoiled(events, 11, lambda event, before: _halves(event.image, before.image))
+
+
+def half_noise(events: list[Event]) -> Iterable[Event]:
+    """Let the lower half of every ninth frame be noise, as a decoder that lost its place leaves it."""
+    rng = np.random.default_rng(5)
+    return _spoiled(events, 9, lambda event, _: _halves(event.image, rng.integers(0, 256, event.image.shape, np.uint8)))
+
+
+def _spoiled(events: list[Event], every: int, image: Callable[[Frame, Frame], Image]) -> Iterable[Event]:
+    """Give every n-th frame another image, by it and its camera's frame before."""
+    frames = [event for event in events if isinstance(event, Frame)]
+    for k, event in enumerate(frames):
+        yield replace(event, image=image(event, frames[k - 2])) if k % every == 4 else event
+
+
+def _halves(upper: Image, lower: Image) -> Image:
+    middle = len(upper) // 2
+    return np.concatenate((upper[:middle], lower[middle:]))
+
+
 CASES = [
     Case("a third of all frames dropped", spoil=dropped, least=FRAMES // 2, last_s=FIRST_S, ends=False),
     Case("two pairs dropped", spoil=pair_dropped, least=FRAMES - 2, last_s=FIRST_S + 0.14),
@@ -73,6 +101,9 @@ CASES = [
         "a damaged pair", during(Trouble(broken_from=0.4), last_s=ONE_FRAME_S), last_s=FIRST_S + 0.1, least=FRAMES - 1
     ),
     Case("a camera that damages all for a second", during(Trouble(broken_from=0.45), [1])),
+    Case("frames shown twice", spoil=repeated, ends=False),
+    Case("torn frames", spoil=torn, least=FRAMES - 2, ends=False),
+    Case("frames half noise", spoil=half_noise, ends=False),
     Case("frames one pair late", spoil=late(1), least=FRAMES - 4),
     Case("frames three pairs late", spoil=late(3), least=FRAMES - 4),
     Case("a clock that jumps and comes back", spoil=another_clock),

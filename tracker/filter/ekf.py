@@ -56,7 +56,8 @@ def update(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig, pro
         goes. The rest is fitted together. When the sum of squares does not fit its chi-square, the smallest set of
         sightings is left out with which it does, of equal sets the one that leaves least; sets of up to a third of
         all are tried, among those without which the sum would fall most, then whole cameras. The prior is broad
-        against a pixel, so it is the marker's rigid shape that finds the liars.
+        against a pixel, so it is the marker's rigid shape that finds the liars. A camera of which most lie shows
+        another time, or the other camera does: then it is between cameras, and none of its sightings is picked out.
     """
     if not sightings:
         return Rejected(Reason.FRAME_GATE, "no sighting near the prediction", ahead.state.t_ns)
@@ -78,7 +79,9 @@ def update(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig, pro
         return Rejected(Reason.FRAME_GATE, "the fit runs away", ahead.state.t_ns)
     best: Fit | None = whole
     if not _fits(whole, probability):
-        best = _without_few(ahead, whole, rig, probability) or _without_a_camera(ahead, batch, rig, probability)
+        best = _without_few(ahead, whole, rig, probability)
+        if best is None or _splits_a_camera(batch, best.batch):
+            best = _without_a_camera(ahead, batch, rig, probability)
     if best is None:
         detail = f"NIS {whole.nis:.0f} with {2 * len(near)} degrees of freedom"
         return Rejected(Reason.FRAME_GATE, detail, ahead.state.t_ns)
@@ -108,6 +111,12 @@ def _without_few(ahead: Prediction, whole: Fit, rig: Rig, probability: float) ->
         if fitting:
             return min(fitting, key=lambda one: one.nis)
     return None
+
+
+def _splits_a_camera(batch: Batch, kept: Batch) -> bool:
+    """Say whether most of a camera's sightings were left out, and some kept."""
+    seen, left = np.bincount(batch.cameras), np.bincount(kept.cameras, minlength=int(batch.cameras.max()) + 1)
+    return bool(((left > 0) & (2 * left < seen)).any())
 
 
 def _without_a_camera(ahead: Prediction, batch: Batch, rig: Rig, probability: float) -> Fit | None:

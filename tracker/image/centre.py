@@ -16,6 +16,7 @@ from enum import Enum, auto
 import numpy as np
 
 from tracker.image import newton
+from tracker.image.evidence import LEAST_EVIDENCE
 from tracker.image.newton import gauss_newton, squares_at
 from tracker.image.patch import Expected, Patch, cut, extent_of, fits_in
 from tracker.image.reading import CHROMA_VAR, LUMA_VAR
@@ -67,19 +68,19 @@ def fit_centre(image: Image, ball: Expected) -> Centre | Reason:
         image: (height, width, 3) BGR.
         ball: what is known of it.
     Returns:
-        Centre; AT_BORDER when its patch leaves the image, NO_BALL when the fit runs away.
+        Centre; AT_BORDER when its patch leaves the image, NO_BALL when nothing is there or the fit runs away.
     Source: Golub, Pereyra, "Separable nonlinear least squares", Inverse Problems 19 (2003), with Kaufman's
         approximation of the Jacobian; weights: Tukey's biweight.
     """
     extent = extent_of(ball)
     if not fits_in(image, extent):
         return Reason.AT_BORDER
-    patch, fit = cut(image, extent, ball.response), np.empty(6)
+    patch, fit = cut(image, extent, ball.response), np.empty(newton.FIT_SIZE)
     luma, chroma = templates_of(ball)
     drawn = luma.fine, luma.made, chroma.fine, chroma.made
     gauss_newton(patch.bright, patch.colour, *drawn, numbers_of(ball), extent.du, extent.dv, fit)
-    du, dv, cov_uu, cov_uv, cov_vv, misfit = fit.tolist()
-    if not math.hypot(du - extent.du, dv - extent.dv) <= MAX_SHIFT_PX:
+    du, dv, cov_uu, cov_uv, cov_vv, misfit, evidence = fit.tolist()
+    if not (math.hypot(du - extent.du, dv - extent.dv) <= MAX_SHIFT_PX and evidence >= LEAST_EVIDENCE):
         return Reason.NO_BALL
     uv_px = frozen_array((extent.u + du, extent.v + dv))
     return Centre(uv_px, frozen_array(((cov_uu, cov_uv), (cov_uv, cov_vv))), misfit)

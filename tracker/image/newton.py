@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.image.doubt import NORMAL, OCTANTS, add_octants, disagreement, doubted_covariance
-from tracker.image.patch import LUMA, TRUST, X, Y
+from tracker.image.evidence import explained
+from tracker.image.patch import LUMA, PLANE, TRUST, X, Y
 from tracker.image.reading import CHROMA_VAR, LUMA_VAR, read
 from tracker.maths.compiled import compiled
-from tracker.maths.solve import cholesky, dot, lower, solve
+from tracker.maths.solve import TINY, cholesky, dot, lower, solve
 from tracker.types import Array
 
-PLANE = 3  # terms of the background
 TUKEY = 4.685  # of the robust sigma: 95 % efficient where all is well (Huber, Ronchetti, "Robust Statistics", 2009)
 LEAST_WEIGHT = 1e-3
 LEAST_MISFIT = 0.4  # a fit is surer where less noise is seen than was allowed for, as far as this
@@ -22,6 +22,7 @@ FARTHEST_PX = 1.5  # a centre further from the middle pixel has run away
 ROUGH_PX = 0.5
 CONVERGED_PX = 0.02  # of the last step; what is left after it is far smaller
 RIDGE = 1.0 + 1e-9
+EVIDENCE, FIT_SIZE = 6, 7  # of what `gauss_newton` fills in
 
 
 @compiled("i8(i8)")
@@ -209,7 +210,11 @@ def gauss_newton(
     bright: Array, colour: Array, luma: NDArray[np.float32], luma_made: Array, chroma: NDArray[np.float32],
     chroma_made: Array, ball: Array, u: float, v: float, fit: Array,
 ) -> None:  # fmt: skip
-    """Fit from a start (u, v), pixels from the patch's middle; fill in u, v, covariance uu, uv, vv and misfit."""
+    """Fit from a start (u, v), pixels from the patch's middle.
+
+    Fills in u, v, covariance uu, uv, vv, misfit, and the evidence that a ball is there at all: by how much chi2 is less
+    than without one.
+    """
     p, n_bright, n_colour = luma.shape[2], bright.shape[1], colour.shape[1]
     drawn_b, drawn_c = np.empty((rows_of(p), n_bright)), np.empty((rows_of(p), n_colour))
     work_b, work_c = np.empty((p + PLANE + 4, n_bright)), np.empty((p + PLANE + 7, n_colour))
@@ -245,6 +250,7 @@ def gauss_newton(
     add_octants(colour, work_c[p + PLANE + 1 :], at_u, at_v, 1.0 / noise_c, octants)
     doubted_covariance(normal, disagreement(normal_b, normal_c), octants, u - at_u, v - at_v, fit[2:5])
     fit[5] = (misfit_b * n_bright + misfit_c * 2 * n_colour) / (n_bright + 2 * n_colour)
+    fit[EVIDENCE] = (explained(bright, tukey_b, squares_b) + explained(colour, tukey_c, squares_c)) / max(TINY, fit[5])
 
 
 @compiled("f8(f8[:, ::1], Array(float32, 3, 'C', True), f8[::1], f8[::1], i8, f8, f8, f8[:, ::1])")

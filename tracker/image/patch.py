@@ -22,6 +22,7 @@ SUBSAMPLED_PX = 2  # most cameras and JPEG keep colour by blocks of 2 x 2 pixels
 FULL_DETAIL = 0.75  # above this share of what neighbours of different blocks differ by, colour is kept by the pixel
 X, Y, TRUST, LUMA = range(4)
 BLUE, RED = 3, 4
+PLANE = 3  # terms of the background
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.image.newton import LEAST_WEIGHT, PLANE, TUKEY, draw_at, fit_linear, residual, rows_of
-from tracker.image.patch import LUMA, TRUST
+from tracker.image.newton import LEAST_WEIGHT, TUKEY, draw_at, fit_linear, residual, rows_of
+from tracker.image.patch import LUMA, PLANE, TRUST
 from tracker.maths.compiled import compiled
 from tracker.types import Array
 

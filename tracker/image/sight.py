@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from tracker.image.centre import MAX_SHIFT_PX
 from tracker.image.colour_table import ColourTable
-from tracker.image.newton import gauss_newton
+from tracker.image.evidence import LEAST_EVIDENCE
+from tracker.image.newton import EVIDENCE, FIT_SIZE, gauss_newton
 from tracker.image.patch import Response, cut_pixels, light_of, trust_of
 from tracker.image.reading import BALL_SIZE, CHROMA_VAR, LUMA_VAR, STREAK_U, STREAK_V
 from tracker.image.reading import RADIUS as BALL_RADIUS
@@ -27,9 +28,10 @@ UV, COV, MISFIT, SPOT, SIZE = slice(0, 2), slice(2, 6), 6, slice(7, 9), 9
 """What a fit gives: the centre [px], its covariance (uu, uv, vu, vv) [px^2], chi2 per degree of freedom, and the
 coloured spot's middle [px]."""
 _MISFIT, _SPOT_U, _SPOT_V = 6, 7, 8
-_FOUND, _NO_COLOUR, _OUT_OF_VIEW, _CUT_OFF, _RAN_AWAY = range(5)
+_FOUND, _NO_COLOUR, _OUT_OF_VIEW, _CUT_OFF, _RAN_AWAY, _NOTHING_THERE = range(6)
 _REASONS = {
     _NO_COLOUR: Reason.NO_BALL, _OUT_OF_VIEW: Reason.AT_BORDER, _CUT_OFF: Reason.AT_BORDER, _RAN_AWAY: Reason.NO_BALL,
+    _NOTHING_THERE: Reason.NO_BALL,
 }  # fmt: skip
 
 Known = tuple[Array, int, Array, Array]
@@ -57,7 +59,8 @@ def find_ball(
         drawn: the templates of its brightness and of its colour.
         fit (SIZE,): filled in.
     Returns:
-        None; NO_BALL when nothing of its colour and size is there or the fit runs away, AT_BORDER when it is cut off.
+        None; NO_BALL when nothing of its colour and size is there but noise, or the fit runs away; AT_BORDER when it is
+        cut off.
     """
     luma, chroma = drawn
     status = _find_and_fit(
@@ -121,7 +124,7 @@ def _find_and_fit(
         return _NO_COLOUR
     if np.isinf(spot_u):
         return _OUT_OF_VIEW
-    ball, found = _ball_of(view, answers), np.empty(6)
+    ball, found = _ball_of(view, answers), np.empty(FIT_SIZE)
     streak_px = math.sqrt(ball[STREAK_U] ** 2 + ball[STREAK_V] ** 2)
     edge_px = ball[BALL_RADIUS] + min(streak_px, STREAK_MAX_PX) / 2.0  # as `patch.edge_of`
     half, middle_u, middle_v = math.ceil(edge_px + MARGIN_PX), round(spot_u), round(spot_v)
@@ -132,6 +135,8 @@ def _find_and_fit(
     gauss_newton(bright, colour, luma, luma_made, chroma, chroma_made, ball, du, dv, found)
     if not (found[0] - du) ** 2 + (found[1] - dv) ** 2 <= MAX_SHIFT_PX**2:
         return _RAN_AWAY
+    if found[EVIDENCE] < LEAST_EVIDENCE:
+        return _NOTHING_THERE
     fit[0], fit[1] = found[0] + middle_u, found[1] + middle_v
     fit[2], fit[3], fit[4], fit[5] = found[2], found[3], found[3], found[4]
     fit[_MISFIT], fit[_SPOT_U], fit[_SPOT_V] = found[5], spot_u, spot_v

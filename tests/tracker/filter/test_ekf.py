@@ -148,6 +148,25 @@ def test_a_lie_is_found_by_the_markers_shape_when_the_track_itself_is_vague(inde
     assert np.linalg.norm(difference(FLYING, found.state)[:3]) < 0.002
 
 
+@pytest.mark.parametrize("stale", [0, 1])
+@pytest.mark.parametrize("seed", range(10))
+def test_a_camera_that_shows_what_it_saw_before_makes_no_pose_wrong(stale: int, seed: int) -> None:
+    """Its balls keep the marker's shape; two of them left out, the third would pull the pose to between the cameras."""
+    rng, period_ns = np.random.default_rng(seed), 2 * PERIOD_NS
+    truth = replace(FLYING, v_BinW=rng.uniform(-0.8, 0.8, 3), w_BinB=rng.uniform(-1.0, 1.0, 3))
+    guess = replace(truth, P=covariance(0.001, 0.01, 0.05, 0.2))
+    for k in range(1, 16):
+        seen = sightings(truth, RIG, [(0, k * period_ns), (1, k * period_ns)], SIGMA_PX, rng)
+        guess = updated(update(predict(guess, k * period_ns, PROCESS), seen, RIG, GATE)).state
+    now_ns = 16 * period_ns
+    views = [(camera, now_ns - period_ns * (camera == stale)) for camera in (0, 1)]
+    seen = tuple(replace(s, t_ns=now_ns) for s in sightings(truth, RIG, views, SIGMA_PX, rng))
+    found = update(predict(guess, now_ns, PROCESS), seen, RIG, GATE)
+    if isinstance(found, Update):
+        error = difference(at(truth, now_ns), found.state)[:6]
+        assert error @ np.linalg.solve(found.state.P[:6, :6], error) < 39.5
+
+
 def test_sightings_of_another_place_are_rejected_as_a_whole() -> None:
     elsewhere = state(0, (-0.3, 0.2, 0.0), (0.0, 0.0, -50.0))
     found = update(FLYING, sightings(elsewhere, RIG, [(0, 0), (1, 0)], SIGMA_PX), RIG, GATE)

@@ -154,6 +154,19 @@ def test_a_ball_partly_hidden_is_within_five_sigma(half_px: float, bgr: Array) -
             assert error @ np.linalg.solve(found.cov_px + 0.02**2 * np.eye(2), error) < 28.7
 
 
+def test_a_ball_that_drowns_in_noise_is_within_five_sigma_or_none() -> None:
+    """28.7 is chi-square's for two errors."""
+    rng, known, drowned = np.random.default_rng(8), accustomed(RADIUS_PX), 0
+    for level in np.repeat([15.0, 30.0, 60.0, 120.0], 20):
+        uv_px = rng.uniform((200, 200), (400, 300))
+        found = fit_centre(picture(uv_px, noise=(level, rng)), known.expected_like(expected(uv_px), CAMERA, uv_px))
+        if isinstance(found, Centre):
+            error = found.uv_px - uv_px
+            assert error @ np.linalg.solve(found.cov_px, error) < 28.7
+        drowned += found is Reason.NO_BALL
+    assert 20 <= drowned <= 60
+
+
 @pytest.mark.parametrize("uv_px", [(1.0, 200.0), (200.0, 2.0), (638.5, 200.0), (200.0, 478.0), (-5.0, -5.0)])
 def test_a_ball_cut_by_the_border_is_rejected(uv_px: tuple[float, float]) -> None:
     assert fit_centre(picture(np.array(uv_px)), expected(np.array(uv_px))) is Reason.AT_BORDER

@@ -54,6 +54,17 @@ def test_a_hidden_ball_is_told_and_the_others_seen() -> None:
     assert "green" in rejected.detail
 
 
+def test_no_ball_is_seen_in_noise_that_holds_every_colour() -> None:
+    """As a decoder may leave of a damaged frame: it has spots of each ball's colour, and one is the nearest."""
+    rng = np.random.default_rng(1)
+    unsure = replace(FLYING, P=covariance(0.01, 0.05, 0.02, 0.05))
+    for _ in range(40):
+        broken = replace(frame(FLYING, RIG, 0, 0), image=rng.integers(0, 256, (480, 640, 3), np.uint8))
+        sightings, rejections = look(broken, unsure)
+        assert sightings == []
+        assert {rejected.reason for rejected in rejections} == {Reason.NO_BALL}
+
+
 def test_balls_out_of_view_are_told() -> None:
     camera = RIG.cameras[0]
     aside = state(0, 1.5 * camera.R_CtoW[:, 0])
