@@ -22,6 +22,7 @@ from tracker.types import Array
 LEAST_OPEN_TURN_RAD = 0.01
 BEND_SHARE = 0.2  # of a sighting's sigma: less does not matter
 LEAST_DOUBT = 0.2  # of the pixels' own noise: less does not matter
+CLOCK_OPEN_PX = 5.0  # one sigma, about a ball's radius: beyond, no slope at one speed and one offset speaks for others
 SHORTEST_S = 1e-3  # a tilt measured twice within less tells no more
 
 
@@ -73,7 +74,7 @@ def fit(ahead: Prediction, batch: Batch, rig: Rig, *, adapt: bool = True) -> Fit
         ahead.state.levels, manoeuvre.variances(process), batch.y, batch.A, batch.B, batch.R, batch.path, batch.doubt,
         ahead.P_coasted, ahead.dt, process.manoeuvre_s, tilt, adapt, ahead.turn_open,
     )  # fmt: skip
-    agreed = _fitted(ahead, batch, rig, levels, P, R)
+    agreed = None if doubtful and _clock_open(batch) else _fitted(ahead, batch, rig, levels, P, R)
     if not doubtful:
         return agreed
     R[:n, :n] += batch.doubt
@@ -108,6 +109,16 @@ def _prepared(
         R[i, i] = tilt
     P = P_coasted + process_noise(len(P_coasted), dt, T, translation, rotation)
     return levels, P, R, not doubts < LEAST_DOUBT * noise
+
+
+def _clock_open(batch: Batch) -> bool:
+    """Say whether a camera looks alone while speed times clock offset, both unknown, moves what it sees by much.
+
+    It shows no instant that clocks could agree on; taken at its word it makes a wrong speed and a wrong offset that
+    bear each other out.
+    """
+    alone = bool((batch.cameras == batch.cameras[0]).all())
+    return alone and float(np.trace(batch.doubt)) > len(batch.z) * CLOCK_OPEN_PX**2
 
 
 def _likelier(agreed: Fit | None, doubted: Fit | None) -> Fit | None:
