@@ -16,6 +16,7 @@ from enum import Enum, auto
 import numpy as np
 
 from tracker.image import newton
+from tracker.image.holder import without_holder
 from tracker.image.newton import gauss_newton, squares_at
 from tracker.image.patch import Expected, Patch, cut, extent_of, fits_in
 from tracker.image.reading import CHROMA_VAR, LUMA_VAR
@@ -60,12 +61,13 @@ def templates_of(ball: Expected) -> tuple[Template, Template]:
     return luma, template_for(ball.radius_px, r.chroma_px, ball.shades, r.block_px)
 
 
-def fit_centre(image: Image, ball: Expected) -> Centre | Reason:
+def fit_centre(image: Image, ball: Expected, held_px: tuple[float, float] | None = None) -> Centre | Reason:
     """Fit the centre of a ball.
 
     Args:
         image: (height, width, 3) BGR.
         ball: what is known of it.
+        held_px: where in the image the tube leads to that holds it, which is left out; None where that is not known.
     Returns:
         Centre; AT_BORDER when its patch leaves the image, NO_BALL when the fit runs away.
     Source: Golub, Pereyra, "Separable nonlinear least squares", Inverse Problems 19 (2003), with Kaufman's
@@ -75,6 +77,8 @@ def fit_centre(image: Image, ball: Expected) -> Centre | Reason:
     if not fits_in(image, extent):
         return Reason.AT_BORDER
     patch, fit = cut(image, extent, ball.response), np.empty(6)
+    if held_px is not None:
+        patch = without_holder(patch, extent, ball, held_px)
     luma, chroma = templates_of(ball)
     drawn = luma.fine, luma.made, chroma.fine, chroma.made
     gauss_newton(patch.bright, patch.colour, *drawn, numbers_of(ball), extent.du, extent.dv, fit)
