@@ -101,7 +101,8 @@ def on_a_tube(uv_px: Array, radius_px: float, noise: Noise) -> Image:
 
 def test_the_tube_that_holds_a_ball_draws_its_centre_unless_it_is_left_out() -> None:
     rng, known = np.random.default_rng(3), accustomed(RADIUS_PX, on_a_tube)
-    drawn_px, left_out_px = [], []
+    drawn_px: list[float] = []
+    left_out_px: list[float] = []
     for _ in range(60):
         u, v = rng.uniform((200, 200), (400, 300))
         image = on_a_tube(np.array((u, v)), RADIUS_PX, (2.0, rng))
@@ -109,7 +110,7 @@ def test_the_tube_that_holds_a_ball_draws_its_centre_unless_it_is_left_out() -> 
         for errors, held_px in ((drawn_px, None), (left_out_px, (u - 60.0, v))):
             found = fit_centre(image, what, held_px)
             assert isinstance(found, Centre)
-            errors.append(found.uv_px[0] - u)
+            errors.append(float(found.uv_px[0]) - u)
     assert np.mean(drawn_px) > 0.02
     assert abs(np.mean(left_out_px)) < 0.01
 
