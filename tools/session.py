@@ -7,6 +7,7 @@ import json
 import os
 from collections.abc import Iterator
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 
 from rich.console import Console
@@ -21,7 +22,7 @@ from bridge.recorder import Recorder
 from bridge.run import Outlets, Steps, close, run
 from bridge.settings import Settings
 from bridge.settings.terms import terms_of
-from bridge.settings.tuning import tuning_of
+from bridge.settings.tuning import calibrated_px, tuning_of
 from bridge.signing import Seal, open_seal
 from bridge.status import StatusLine
 from bridge.summary import Summary, to_text
@@ -108,7 +109,7 @@ def _troubles(summary: Summary, last_rejection: str, frames: str) -> Iterator[st
 
 def tracker_of(settings: Settings, rig: Rig, clocks: Clocks) -> Steps:
     """Make the tracker that the config's method names."""
-    tuning = tuning_of(settings.tracker)
+    tuning = replace(tuning_of(settings.tracker), calibrated_px=calibrated_px(settings))
     made = PaperTracker if settings.tracker.method == "paper" else Tracker
     return made(rig, tuning, clocks.stopwatch)
 

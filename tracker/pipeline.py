@@ -73,7 +73,7 @@ class Tracker:
         self._lights_tried = 0
         self._continuity = Continuity(tuning)
         self._cadence = Cadence(len(rig.cameras))
-        self._watch = CalibrationWatch(rig, tuning.process.pixel_noise_px)
+        self._watch = CalibrationWatch(rig, tuning.process.pixel_noise_px, tuning.calibrated_px)
         self._moved_px = np.zeros(len(rig.cameras))
         self._anew = False
         self._seen_ns: dict[tuple[int, int], int] = {}  # by camera and ball

@@ -17,7 +17,7 @@ class Witness(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class CameraHealth:
-    """Whether one camera stands where it stood when the flight began.
+    """Whether one camera stands where it stood when the flight began, and there where the room file has it.
 
     moved: beyond doubt it does not.  witness: what the room says.  shift_px: how far the room has moved in its
     picture, at the corner where that is most [px].  at_vehicle_mm: how far such a shift moves a ball that only this
@@ -37,6 +37,7 @@ class Health:
 
     t_ns: when that was judged, stream time [ns].
     at_odds: the rays to the balls say that some camera has moved, and nothing tells which.
+    from_start: they said so from the beginning: it does not stand where the room file has it.
     epipolar_px: how far a ball lies off the plane of the other camera's ray, rms over pairs of cameras [px].
     spacing_mm: how far the balls stand from their distances on the marker, rms [mm].  Both None where no two cameras
         see the marker.
@@ -47,11 +48,13 @@ class Health:
     at_odds: bool = False
     epipolar_px: float | None = None
     spacing_mm: float | None = None
+    from_start: bool = False
 
     @property
     def brief(self) -> str:
         """What is wrong in a few words, "" for nothing."""
         moved = [camera.name for camera in self.cameras if camera.moved]
-        if moved:
-            return f"{' '.join(moved)} moved, poses poor: land"
-        return "a camera moved, poses poor: land" if self.at_odds else ""
+        if not moved and not self.at_odds:
+            return ""
+        who = " ".join(moved) or "a camera"
+        return f"{who} not as calibrated: do not fly" if self.from_start else f"{who} moved, poses poor: land"

@@ -17,6 +17,7 @@ class Tuning:
     coast_limit_ns: without a sighting for longer the track is lost.
     tilt_limit_rad: no vehicle that flies leans further; a pose that does is a mistake, such as a mirrored marker.
     continuity_limit_ns: a track lost for longer cannot claim to be the same on return, whatever its prediction says.
+    calibrated_px: by how much balls missed when the room was calibrated, one sigma; None where nobody measured it.
     """
 
     process: Process
@@ -25,3 +26,4 @@ class Tuning:
     coast_limit_ns: int
     continuity_limit_ns: int
     tilt_limit_rad: float
+    calibrated_px: float | None = None

@@ -30,8 +30,8 @@ class CameraReading:
     clock_offset_ms, clock_sigma_ms: how much later than its stamps it was found to see, beyond what the config says,
         and one sigma of that [ms]; None while not estimated.
     configured_offset_ms: the config's clock_offset_ms.
-    moved: whether it no longer stands where it stood when the flight began.  shift_px, at_vehicle_mm: see
-        `tracker.standing.CameraHealth`.
+    moved: whether it no longer stands where it stood when the flight began, or where the room file has it.
+    shift_px, at_vehicle_mm: see `tracker.standing.CameraHealth`.
     """
 
     name: str
@@ -66,6 +66,7 @@ class Readings:
     last_rejection: what was left out last and why, "" for nothing.
     at_odds: the rays to the balls say that a camera has moved, and nothing tells which.
     epipolar_px: by how much those rays miss each other; None where not known [px].
+    from_start: they said so from the beginning.
     """
 
     t_ns: int
@@ -84,3 +85,4 @@ class Readings:
     last_rejection: str = ""
     at_odds: bool = False
     epipolar_px: float | None = None
+    from_start: bool = False

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from bridge.alarms.link_rules import LINK_RULES
-from bridge.alarms.readings import Readings
+from bridge.alarms.readings import CameraReading, Readings
 from bridge.alarms.rule import Finding, Level, Rule, Verdict, above, below
 from tracker.types import TrackState
 
@@ -181,21 +181,31 @@ def _clock_offset(now: Readings) -> Iterator[Finding]:
 def _camera_moved(now: Readings) -> Iterator[Finding]:
     for camera in now.cameras:
         if camera.moved:
-            seen = f": the room stands {camera.shift_px:.1f} px off in its picture" if camera.shift_px else ""
             yield Finding(
                 camera.name,
                 Verdict.BAD,
-                f"{camera.name} was moved{seen}, {camera.at_vehicle_mm:.0f} mm at the vehicle",
+                f"{camera.name} {_how_it_moved(camera, now.from_start)}",
                 "land, fix it; then `posebridge calibrate refine LOG`, or calibrate the room anew",
             )
 
 
+def _how_it_moved(camera: CameraReading, from_start: bool) -> str:
+    if camera.shift_px:
+        return (
+            f"was moved: the room stands {camera.shift_px:.1f} px off in its picture, "
+            f"{camera.at_vehicle_mm:.0f} mm at the vehicle"
+        )
+    where = "does not stand where the room file has it" if from_start else "was moved"
+    return f"{where}: its rays miss the balls"
+
+
 def _cameras_at_odds(now: Readings) -> Iterator[Finding]:
     if now.at_odds:
+        what = "does not stand where the room file has it" if now.from_start else "was moved"
         yield Finding(
             "",
             Verdict.BAD,
-            f"a camera was moved: rays to the balls miss by {now.epipolar_px or 0:.1f} px, and nothing tells whose",
+            f"a camera {what}: rays to the balls miss by {now.epipolar_px or 0:.1f} px, and nothing tells whose",
             "land, see which hangs loose; then calibrate the room anew; hang something with corners where they look",
         )
 

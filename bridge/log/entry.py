@@ -145,6 +145,7 @@ def health_value(health: Health) -> Value:
         "at_odds": health.at_odds,
         "epipolar_px": health.epipolar_px,
         "spacing_mm": health.spacing_mm,
+        "from_start": health.from_start,
         "cameras": [
             {
                 "name": camera.name,

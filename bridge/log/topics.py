@@ -196,6 +196,7 @@ HEALTH = json_topic(
     at_odds={"type": "boolean", "description": "some camera has moved, and nothing tells which"},
     epipolar_px=number("by how much rays to the balls miss each other, rms [px]"),
     spacing_mm=number("how far the balls stand from their distances on the marker, rms [mm]"),
+    from_start={"type": "boolean", "description": "rays say that a camera does not stand where the room file has it"},
     cameras=each(
         "in their order",
         name=text("the camera's"),

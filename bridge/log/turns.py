@@ -96,7 +96,8 @@ def _health(value: dict[str, Any]) -> Health:
         CameraHealth(one["name"], one["moved"], Witness(one["witness"]), one["shift_px"], one["at_vehicle_mm"])
         for one in value["cameras"]
     )
-    return Health(value["t_ns"], cameras, value["at_odds"], value["epipolar_px"], value["spacing_mm"])
+    figures = value["at_odds"], value["epipolar_px"], value["spacing_mm"]
+    return Health(value["t_ns"], cameras, *figures, value.get("from_start", False))  # logs of before have no such word
 
 
 def _sightings(value: dict[str, Any], *, used: bool) -> tuple[BallSighting, ...]:

@@ -10,6 +10,7 @@ import numpy as np
 from bridge.ned import NedFrame
 from bridge.wire import Sent
 from tracker.maths import so3
+from tracker.standing import Health
 from tracker.types import Array, Estimate, Step, TrackState
 
 POSES = ("VISION_POSITION_ESTIMATE", "ODOMETRY", "ATT_POS_MOCAP")
@@ -47,7 +48,7 @@ class PoseWatch:
     """Watch every turn of the loop.
 
     poses: the newest, oldest first.  timings: of those that left.  estimates: how many there were.
-    state: the track's.
+    state: the track's.  health: what was last said of the cameras' stand, None before.
     """
 
     def __init__(self, room_yaw_deg: float) -> None:
@@ -57,6 +58,7 @@ class PoseWatch:
         self.timings: deque[Timing] = deque(maxlen=_KEPT)
         self.estimates = 0
         self.state = TrackState.SEARCHING
+        self.health: Health | None = None
 
     def take(self, step: Step, sent: tuple[Sent, ...], now_ns: int) -> Pose | None:
         """Take one turn, and return its newest pose, None for none.
@@ -64,6 +66,7 @@ class PoseWatch:
         now_ns: stream time just before the estimates were sent [ns].
         """
         self.state = step.state
+        self.health = step.health or self.health
         for estimate in step.estimates:
             self.estimates += 1
             self._estimates.append((estimate, now_ns))

@@ -25,7 +25,7 @@ from bridge.preflight.poses import PoseWatch
 from bridge.preflight.requests import ATTITUDE, GYRO, POSITION, STATUS, Requests, rates
 from bridge.preflight.rules import Rule, judge, names_of
 from bridge.preflight.said import said
-from bridge.preflight.streams import link_line, pose_lines, time_line, track_line
+from bridge.preflight.streams import camera_lines, link_line, pose_lines, time_line, track_line
 from bridge.preflight.verdict import Line, Mark, Section
 from bridge.preflight.wiggle import gyro_lag_s, wiggled
 from bridge.wire import LinkState, Message, Received, Sent
@@ -151,14 +151,15 @@ class Preflight:
         profile, since_ns = PROFILES[far.profile], window_ns[0]
         sent = (f"sent: {', '.join(self._given.messages or profile.messages)} (profile {profile.name})",)
         poses = pose_lines(self.watch, profile, far.holding, window_ns, self._given.max_age_ms)
-        yield Section("Poses", (track_line(self.watch), *poses, link_line(link), time_line(far.sync)), sent)
+        lines = (track_line(self.watch), *camera_lines(self.watch), *poses, link_line(link), time_line(far.sync))
+        yield Section("Poses", lines, sent)
         ours = self.watch.since(since_ns)
         yield Section("Fusion", tuple(fusion_lines(self.hearing, ours, far.sync, peer.autopilot, since_ns)))
         budget = self.budget(window_ns)
         known = {} if self.parameters is None else self.parameters.known
-        lines = delay_lines(budget, peer.autopilot, far.sync, self.wiggle, self._lag_s(), known)
+        delays = delay_lines(budget, peer.autopilot, far.sync, self.wiggle, self._lag_s(), known)
         notes = (*(() if budget is None else budget.rows()), *((BY_ARRIVAL,) if far.by_arrival else ()))
-        yield Section("Delay", tuple(lines), notes)
+        yield Section("Delay", tuple(delays), notes)
 
     def _said(self, since_ns: int) -> Section:
         asked_ns = self._asked_checks_ns

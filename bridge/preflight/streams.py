@@ -88,6 +88,20 @@ def track_line(watch: PoseWatch) -> Line:
     return Line(Mark.FAIL, "track", watch.state.value, "tracking", fix)
 
 
+def camera_lines(watch: PoseWatch) -> Iterator[Line]:
+    """Yield the line on the cameras' stand, once rays to the balls have been held against each other."""
+    health = watch.health
+    if health is None or health.epipolar_px is None:
+        return
+    found, needed = f"rays to the balls miss by {health.epipolar_px:.2f} px", "cameras stand as they were calibrated"
+    if not health.brief:
+        yield Line(Mark.PASS, "cameras", found, needed)
+        return
+    who = " and ".join(camera.name for camera in health.cameras if camera.moved) or "one of them, nothing tells which,"
+    fix = f"{who} was moved: fix it, then calibrate the room anew, or posebridge calibrate refine with a flight's log"
+    yield Line(Mark.FAIL, "cameras", found, needed, fix)
+
+
 def link_line(link: LinkState) -> Line:
     """Return the line on the link's own losses."""
     share = (link.dropped + link.superseded) / max(link.sent + link.dropped + link.superseded, 1)

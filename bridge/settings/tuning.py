@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from bridge.settings.models import TrackerSettings
+from bridge.settings.models import Settings, TrackerSettings
 from tracker.state import Process
 from tracker.tuning import Tuning
 
@@ -32,3 +32,11 @@ def tuning_of(settings: TrackerSettings) -> Tuning:
         continuity_limit_ns=round(settings.continuity_limit_ms * NS_PER_MS),
         tilt_limit_rad=math.radians(settings.tilt_limit_deg),
     )
+
+
+def calibrated_px(settings: Settings) -> float | None:
+    """Return by how much balls missed when the room was calibrated [px]; None where its cameras do not count."""
+    measured = settings.rig.measured
+    if measured is None or settings.rig.calibration or measured.reprojection_px < 0.0:  # below 0: not measured
+        return None
+    return measured.reprojection_px

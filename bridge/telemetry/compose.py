@@ -49,6 +49,7 @@ def readings_of(gauges: Gauges, around: Surroundings, limits: Limits) -> Reading
         last_rejection=gauges.last_rejection,
         at_odds=gauges.health is not None and gauges.health.at_odds,
         epipolar_px=None if gauges.health is None else gauges.health.epipolar_px,
+        from_start=gauges.health is not None and gauges.health.from_start,
     )
 
 

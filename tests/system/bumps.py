@@ -27,13 +27,14 @@ SETTINGS = load_settings("lab")
 
 @dataclass(frozen=True)
 class Bump:
-    """A flight. knock: what befalls a camera at BUMP_S, None for nothing.  other: what else spoils the pictures."""
+    """A flight. knock: what befalls a camera from a time on, None for nothing.  other: what else spoils it."""
 
     knock: Knock | None
     cameras: int = 2
     seed: int = 1
     gamma: float = 1.0
     other: Callable[[int, float], Trouble] | None = None
+    from_s: float = BUMP_S
 
     def rig(self) -> Rig:
         return RIG if self.cameras == 2 else ring_rig(RIG.marker, self.cameras)
@@ -41,7 +42,7 @@ class Bump:
     def trouble(self, camera: int, t_s: float) -> Trouble:
         if self.other is not None:
             return self.other(camera, t_s)
-        return Trouble(knocks=(self.knock,)) if self.knock is not None and t_s >= BUMP_S else Trouble()
+        return Trouble(knocks=(self.knock,)) if self.knock is not None and t_s >= self.from_s else Trouble()
 
     def trial(self) -> Trial:
         timing = SimTiming(15.0, DURATION_S)

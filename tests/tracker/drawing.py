@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+import cv2
 import numpy as np
 
 from tests.tracker.rigs import at
@@ -85,3 +86,10 @@ def developed(canvas: Array, noise: tuple[float, np.random.Generator] | None = N
         sigma, rng = noise
         canvas = canvas + sigma * rng.standard_normal(canvas.shape, dtype=np.float32)
     return np.clip(np.rint(canvas), 0, 255).astype(np.uint8)
+
+
+def through_jpeg(image: Image, quality: int = 90) -> Image:
+    """Return what JPEG leaves of an image, colour kept by blocks of 2 x 2 pixels."""
+    options = [cv2.IMWRITE_JPEG_QUALITY, quality]
+    options += [cv2.IMWRITE_JPEG_SAMPLING_FACTOR, cv2.IMWRITE_JPEG_SAMPLING_FACTOR_420]
+    return np.asarray(cv2.imdecode(cv2.imencode(".jpg", image, options)[1], cv2.IMREAD_COLOR), dtype=np.uint8)

@@ -1,6 +1,7 @@
 """Whether the rays of all cameras still meet as they did, and if not, whose do not.
 
-    a sample now and then -> held against what those before tell of the calibration's own faults -> evidence by camera
+    a sample now and then -> held against what the room file and the samples before tell of the calibration's own faults
+    -> evidence by camera
 
 Each sample is weighed alone and none counts beyond a limit, so a hand or a false ball in one of them is no alarm.
 """
@@ -10,81 +11,129 @@ from __future__ import annotations
 import math
 from collections import deque
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
 from tracker.health.sample import MOTION, Sample
+from tracker.rig import Rig
 from tracker.types import Array
 
 RECENT = 3  # samples that are judged together
-FIRST = 3  # older ones that it takes to know the calibration's own faults
+FIRST = 3  # older ones that it takes to know the calibration's own faults, where no room file tells them
 FADING = 0.98  # of the older ones, with each that joins them
 CALIBRATED_M, CALIBRATED_RAD = 0.003, math.radians(0.1)  # one sigma: what a calibration leaves
 DRIFT_M, DRIFT_RAD = 0.0003, math.radians(0.01)  # one sigma: what comes and goes with light, lens and place
-KNOCK_M, KNOCK_RAD = 0.01, math.radians(0.5)  # one sigma of a camera that was knocked
+KNOCKS = (0.01, math.radians(0.5)), (0.003, math.radians(0.12))  # one sigma [m], [rad]: of a hard one, of a slight one
 MOST_EVIDENCE = 7.4  # of one sample [nats]
 AT_ODDS = 15.0  # of all recent ones: more than two can give [nats]
-NAMED = 5.0  # by which a sample usually speaks more against one camera than against any other [nats]
+NAMED = 6.0  # by which any story that leaves a camera out is worse than the best one [nats]
+
+
+LEAST_PX = 0.03  # no calibration is believed to fit balls better
+Hypothesis = tuple[int, ...]
+"""The cameras that have moved."""
 
 
 @dataclass(frozen=True, slots=True)
 class Odds:
-    """The verdict. at_odds: some camera has moved.  suspect: which one, None where that cannot be told."""
+    """The verdict.
+
+    at_odds: some camera has moved.  suspects: which, none where that cannot be told.
+    from_start: it had when the flight began: it does not stand where the room file has it.
+    """
 
     at_odds: bool
-    suspect: int | None
+    suspects: Hypothesis = ()
+    from_start: bool = False
 
 
 class Agreement:
-    """Samples of a flight, old and recent."""
+    """Samples of a flight, old and recent.
 
-    def __init__(self, cameras: int) -> None:
+    faults: (6 cameras, 6 cameras) covariance of those that the room file owns up to, see `left_open`; None for no file.
+    """
+
+    def __init__(self, cameras: int, faults: Array | None = None) -> None:
         self._cameras = cameras
-        self._N = np.diag(1.0 / _spread(cameras, CALIBRATED_M, CALIBRATED_RAD))
+        usual = np.diag(_spread(cameras, CALIBRATED_M, CALIBRATED_RAD))
+        self._prior = np.asarray(np.linalg.inv(usual if faults is None else faults))
+        self._first = FIRST if faults is None else 0
+        self._N = self._prior.copy()
         self._g = np.zeros(MOTION * cameras)
         self._older = 0
         self._recent: deque[tuple[Sample, list[float]]] = deque()
 
     def add(self, sample: Sample) -> Odds:
         """Weigh a sample, and say what all recent ones come to. Once at odds, what was learned before stays."""
-        self._recent.append((sample, self._evidence(sample) if self._older >= FIRST else [0.0] * self._cameras))
+        told = self._older >= self._first
+        self._recent.append((sample, self._evidence(sample, self._alone) if told else [0.0] * self._cameras))
         odds = self._odds()
         if len(self._recent) > RECENT:
             self._recent.popleft() if odds.at_odds else self._grow_old()
         return odds
 
+    @property
+    def _alone(self) -> list[Hypothesis]:
+        return [(camera,) for camera in range(self._cameras)]
+
     def _grow_old(self) -> None:
         sample, _ = self._recent.popleft()
-        prior = np.diag(1.0 / _spread(self._cameras, CALIBRATED_M, CALIBRATED_RAD))
-        self._N = prior + FADING * (self._N - prior) + sample.N
+        self._N = self._prior + FADING * (self._N - self._prior) + sample.N
         self._g = FADING * self._g + sample.g
         self._older += 1
 
     def _odds(self) -> Odds:
         evidence = np.array([each for _, each in self._recent])
-        at_odds = bool(np.minimum(evidence, MOST_EVIDENCE).sum(axis=0).max() > AT_ODDS)
-        usual = np.median(evidence, axis=0)
-        second, best = np.argsort(usual)[-2:].tolist()
-        return Odds(at_odds, best if at_odds and usual[best] - usual[second] > NAMED else None)
+        if np.minimum(evidence, MOST_EVIDENCE).sum(axis=0).max() <= AT_ODDS:
+            return Odds(at_odds=False)
+        return Odds(True, self._suspects(), from_start=self._older < FIRST)
 
-    def _evidence(self, sample: Sample) -> list[float]:
-        """Return by how much each camera's knock explains a sample better than none [nats].
+    def _suspects(self) -> Hypothesis:
+        """Return the cameras without which neither one that moved nor two explain the recent samples nearly as well."""
+        whole = Sample(
+            np.sum([sample.N for sample, _ in self._recent], axis=0),
+            np.sum([sample.g for sample, _ in self._recent], axis=0),
+        )
+        hypotheses = self._alone + list(combinations(range(self._cameras), 2))
+        evidence = np.array(self._evidence(whole, hypotheses))
+        by_others = [
+            max(found for found, moved in zip(evidence.tolist(), hypotheses, strict=True) if camera not in moved)
+            for camera in range(self._cameras)
+        ]
+        return tuple(camera for camera, found in enumerate(by_others) if evidence.max() - found > NAMED)
+
+    def _evidence(self, sample: Sample, hypotheses: list[Hypothesis]) -> list[float]:
+        """Return by how much a knock of some cameras explains a sample better than none [nats].
 
         Source: the motions c have a mean m and covariance Q, with or without a knock's own variance; the likelihood
-            of a sample is exp(e' B (I + B' N B)^-1 B' e / 2) / sqrt(det(I + B' N B)), e = g - N m, B B' = Q.
+            of a sample is exp(e' B (I + B' N B)^-1 B' e / 2) / sqrt(det(I + B' N B)), e = g - N m, B B' = Q. A hard
+            knock and a slight one are as likely.
         """
         P = np.asarray(np.linalg.inv(self._N), dtype=np.float64)
         e = sample.g - sample.N @ (P @ self._g)
         Q = P + np.diag(_spread(self._cameras, DRIFT_M, DRIFT_RAD))
         without = _log_likelihood(e, sample.N, Q)
-        knock = _spread(1, KNOCK_M, KNOCK_RAD)
         found = []
-        for camera in range(self._cameras):
-            wider = Q.copy()
-            k = np.arange(MOTION * camera, MOTION * (camera + 1))
-            wider[k, k] += knock
-            found.append(_log_likelihood(e, sample.N, wider) - without)
+        for moved in hypotheses:
+            k = np.concatenate([np.arange(MOTION * camera, MOTION * (camera + 1)) for camera in moved])
+            each = []
+            for knock in KNOCKS:
+                wider = Q.copy()
+                wider[k, k] += _spread(len(moved), *knock)
+                each.append(_log_likelihood(e, sample.N, wider))
+            found.append(float(np.logaddexp.reduce(each)) - math.log(len(each)) - without)
         return found
+
+
+def left_open(residual_px: float, rig: Rig) -> Array:
+    """Return the covariance (6 cameras, 6 cameras) of faults in the cameras' stand that residuals would show so large.
+
+    residual_px: by how much balls missed about the room's origin, one sigma [px].
+    """
+    turns_rad = [max(residual_px, LEAST_PX) / camera.focal_px for camera in rig.cameras]
+    places_m = [turn * np.linalg.norm(camera.p_CinW) for turn, camera in zip(turns_rad, rig.cameras, strict=True)]
+    return np.diag(np.repeat(np.column_stack((places_m, turns_rad)).reshape(-1), 3) ** 2)
 
 
 def _log_likelihood(e: Array, N: Array, Q: Array) -> float:

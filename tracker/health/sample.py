@@ -17,6 +17,7 @@ from tracker.rig import Rig
 from tracker.state import OFFSETS, State
 from tracker.types import Array, BallSighting
 
+LEAST_CLOCK_S = 1e-6
 MOTION = 6  # of a camera: its place in W [m], then its turn in W about itself [rad]
 
 
@@ -45,13 +46,20 @@ class Linear:
 
 
 def take_sample(sightings: Sequence[BallSighting], state: State, rig: Rig, sigma_px: float) -> Sample | None:
-    """Hold sightings against a pose and take out what another pose would explain; None as `linearised` gives it."""
+    """Hold sightings against a pose; take out what another pose and other clocks would explain.
+
+    None as `linearised` gives it.
+    Source: (1) and (2) with the clock offsets beside the pose, J' J being J' J and what the filter knows of them; their
+        rows of one over sigma below the slopes make an orthogonal basis whose upper part does that.
+    """
     one = linearised(sightings, state, rig, sigma_px)
     if one is None:
         return None
-    basis = np.linalg.qr(one.J)[0]
-    D = one.D - basis @ (basis.T @ one.D)
-    return Sample(D.T @ D, D.T @ one.r)
+    clocks_s = np.sqrt(np.maximum(np.diag(state.P)[OFFSETS:], LEAST_CLOCK_S**2))
+    known = np.hstack((np.zeros((len(clocks_s), one.J.shape[1])), np.diag(1.0 / clocks_s)))
+    basis = np.linalg.qr(np.vstack((np.hstack((one.J, one.C)), known)))[0][: len(one.r)]
+    within = basis.T @ one.D
+    return Sample(one.D.T @ one.D - within.T @ within, one.D.T @ one.r - within.T @ (basis.T @ one.r))
 
 
 def linearised(sightings: Sequence[BallSighting], state: State, rig: Rig, sigma_px: float) -> Linear | None:

@@ -15,7 +15,7 @@ import numpy as np
 
 from tracker.camera import Camera
 from tracker.filter.measure import predicted_pixels
-from tracker.health.agreement import Agreement, Odds
+from tracker.health.agreement import Agreement, Odds, left_open
 from tracker.health.background import NEVER_NS, Background
 from tracker.health.mend import turned
 from tracker.health.rays import residuals
@@ -29,21 +29,23 @@ SAMPLE_NS = 2_000_000_000
 TOGETHER_NS = 70_000_000  # sightings of different cameras this close are held against one state
 FIGURES = 5  # samples that the figures are of
 REACH = 1.5  # of the marker's size: how far rotor and boom reach round the balls
-NOBODY = Odds(at_odds=False, suspect=None)
+NOBODY = Odds(at_odds=False)
 
 
 class CalibrationWatch:
-    """Notice that a camera no longer stands where it stood when the flight began.
+    """Notice that a camera no longer stands where it stood when the flight began, or where the room file has it.
 
     rig: as calibrated.  sigma_px: what a camera adds to the noise of its fits [px].
+    calibrated_px: by how much balls missed when the room was calibrated [px]; None where nobody measured it.
     """
 
-    def __init__(self, rig: Rig, sigma_px: float) -> None:
+    def __init__(self, rig: Rig, sigma_px: float, calibrated_px: float | None = None) -> None:
         self._rig = rig
-        self._sigma_px = sigma_px
+        self._sigma_px = max(sigma_px, calibrated_px or 0.0)
         cameras = rig.cameras
         self._backgrounds = [Background(camera, ahead=k / len(cameras)) for k, camera in enumerate(cameras)]
-        self._agreement = Agreement(len(rig.cameras))
+        faults = None if calibrated_px is None else left_open(calibrated_px, rig)
+        self._agreement = Agreement(len(cameras), faults)
         self._odds = NOBODY
         self._left: deque[Callable[[], None]] = deque()  # of the last sample's judgement, a part a round
         self._newest: dict[int, list[BallSighting]] = {}
@@ -89,7 +91,8 @@ class CalibrationWatch:
         longer_m = [value for _, figures in self._figures for value in figures]
         cameras = tuple(self._camera(index, state) for index in range(len(self._rig.cameras)))
         named = any(camera.moved for camera in cameras)
-        return Health(t_ns, cameras, self._odds.at_odds and not named, _rms(off_px), _rms(longer_m, 1e3))
+        at_odds, from_start = self._odds.at_odds and not named, self._odds.from_start
+        return Health(t_ns, cameras, at_odds, _rms(off_px), _rms(longer_m, 1e3), from_start)
 
     def mended(self, camera: int) -> Camera | None:
         """Return a moved camera as the room tells that it stands now, None where the room does not tell."""
@@ -130,7 +133,7 @@ class CalibrationWatch:
         background, camera = self._backgrounds[index], self._rig.cameras[index]
         largest_px = 0.0 if background.newest is None else background.newest.largest_px
         away_m = 0.0 if state is None else float(np.linalg.norm(state.p_BinW - camera.p_CinW))
-        moved = background.witness is Witness.MOVED or self._odds.suspect == index
+        moved = background.witness is Witness.MOVED or index in self._odds.suspects
         at_vehicle_mm = 1e3 * largest_px * away_m / camera.focal_px
         return CameraHealth(camera.name, moved, background.witness, largest_px, at_vehicle_mm)
 

@@ -24,10 +24,11 @@ from bridge.preflight.poses import PoseWatch, Timing
 from bridge.preflight.requests import ATTITUDE, POSITION
 from bridge.preflight.rules import Accepts, exactly, judge, with_bits, within
 from bridge.preflight.said import said
-from bridge.preflight.streams import link_line, pose_lines, time_line
+from bridge.preflight.streams import camera_lines, link_line, pose_lines, time_line
 from bridge.preflight.verdict import Line, Mark, Section, Write, good, writes
 from bridge.wire import LinkState, Received
 from tests.bridge.dialogue.far_autopilot import from_autopilot
+from tracker.standing import CameraHealth, Health, Witness
 
 HELI = Peer(1, 1, Autopilot.ARDUPILOT)
 SECOND_NS = 1_000_000_000
@@ -73,6 +74,21 @@ def test_a_page_is_good_only_if_nothing_failed_and_nothing_stayed_unseen() -> No
     assert good([lines[Mark.PASS], lines[Mark.WARN]])
     assert not good([lines[Mark.PASS], lines[Mark.FAIL]])
     assert not good([lines[Mark.PASS], lines[Mark.UNKNOWN]])
+
+
+def test_cameras_that_do_not_stand_as_calibrated_fail_and_are_named_if_they_can_be() -> None:
+    watch = PoseWatch(0.0)
+    assert list(camera_lines(watch)) == []
+    both = tuple(CameraHealth(name, False, Witness.STILL) for name in ("left", "right"))
+    for cameras, at_odds, mark, fix in (
+        (both, False, Mark.PASS, ""),
+        ((both[0], replace(both[1], moved=True)), False, Mark.FAIL, "right was moved"),
+        (both, True, Mark.FAIL, "nothing tells which"),
+    ):
+        watch.health = Health(0, cameras, at_odds, 1.2, 0.3, from_start=True)
+        (line,) = camera_lines(watch)
+        assert line.mark is mark
+        assert fix in line.fix
 
 
 def test_a_parameter_that_two_lines_want_is_written_once() -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from tests.tracker.drawing import developed, draw_ball, draw_band, empty_canvas
+from tests.tracker.drawing import developed, draw_ball, draw_band, empty_canvas, through_jpeg
 from tests.tracker.paper_rig import paper_rig
 from tracker.image.appearance import Appearance
 from tracker.image.centre import Centre, fit_centre
@@ -89,6 +89,30 @@ def test_a_bar_under_every_ball_is_not_taken_for_shade() -> None:
         assert isinstance(found, Centre)
         errors.append(found.uv_px - uv_px)
     assert np.abs(np.mean(errors, axis=0)).max() < 0.02
+
+
+def on_a_tube(uv_px: Array, radius_px: float, noise: Noise) -> Image:
+    """Take a picture, through JPEG, of a ball with a dark tube that comes from the left."""
+    canvas = empty_canvas(CAMERA)
+    draw_ball(canvas, uv_px, radius_px, BALL)
+    draw_band(canvas[:, : round(float(uv_px[0]) - 0.8 * radius_px)], uv_px, 0.0, 0.0, 0.4, TUBE_BGR)
+    return through_jpeg(developed(canvas, noise))
+
+
+def test_the_tube_that_holds_a_ball_draws_its_centre_unless_it_is_left_out() -> None:
+    rng, known = np.random.default_rng(3), accustomed(RADIUS_PX, on_a_tube)
+    drawn_px: list[float] = []
+    left_out_px: list[float] = []
+    for _ in range(60):
+        u, v = rng.uniform((200, 200), (400, 300))
+        image = on_a_tube(np.array((u, v)), RADIUS_PX, (2.0, rng))
+        what = known.expected_like(expected(np.array((u, v))), CAMERA, np.array((u, v)))
+        for errors, held_px in ((drawn_px, None), (left_out_px, (u - 60.0, v))):
+            found = fit_centre(image, what, held_px)
+            assert isinstance(found, Centre)
+            errors.append(float(found.uv_px[0]) - u)
+    assert np.mean(drawn_px) > 0.02
+    assert abs(np.mean(left_out_px)) < 0.01
 
 
 @pytest.mark.parametrize("radius_px", [2.2, 2.8, 4.0, 6.5])

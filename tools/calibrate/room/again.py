@@ -90,9 +90,14 @@ class Again:
         camera = self.rig.cameras[self.camera]
         return self.clips[k].frame(camera.width_px, camera.height_px).image
 
+    def held_px(self, k: int) -> tuple[float, float]:
+        """Return where in an image the tubes meet that hold the balls: amid them."""
+        u, v, _ = self.clips[k].centres_px.mean(axis=0).tolist()
+        return u, v
+
     def _refitted(self, image: Image, rivals: Rivals, k: int, ball: int) -> Array:
         """Return a ball's centre and one sigma (3,) [px]; that of the first look, believed less, where none fits."""
-        fit = fit_centre(image, self.expected(rivals, k, ball))
+        fit = fit_centre(image, self.expected(rivals, k, ball), self.held_px(k))
         if isinstance(fit, Centre):
             return np.append(fit.uv_px, sigma_px(fit))
         return np.asarray(self.clips[k].centres_px[ball] * (1.0, 1.0, DOUBT))

@@ -59,9 +59,8 @@ def test_misplaced_cameras_are_found_again_within_what_is_said_of_them_and_so_ar
     found = find_cameras(footage, said)
     off_m, off_rad = errors_of(found, true)
     off_s = np.array([camera.clock_offset_ns for camera in found.cameras]) * 1e-9 - np.array(late_ns) * 1e-9
-    if not look.jpeg_quality:  # JPEG draws the balls inwards: docs/room.md says by how much rooms miss it
-        assert np.linalg.norm(off_m, axis=1).max() < 0.002
-        assert np.linalg.norm(off_rad, axis=1).max() < math.radians(0.05)
+    assert np.linalg.norm(off_m, axis=1).max() < 0.002
+    assert np.linalg.norm(off_rad, axis=1).max() < math.radians(0.05)
     assert np.abs(off_s).max() < 0.0005
     sigmas = np.sqrt(np.diag(camera_covariance(found.adjusted))).reshape(cameras, CAMERA)
     assert (np.linalg.norm(off_m, axis=1) < 3.0 * np.linalg.norm(sigmas[:, :3], axis=1)).all()
