@@ -32,7 +32,7 @@ from tracker.intake import Intake
 from tracker.rig import Rig
 from tracker.rounds import Rounds
 from tracker.standing import Health
-from tracker.start.acquire import Seen, first_state
+from tracker.start.acquire import Seen, first_state, together
 from tracker.state import OFFSETS, State
 from tracker.study import Round, Study
 from tracker.tuning import Tuning
@@ -230,8 +230,15 @@ class Tracker:
         if isinstance(start, Rejected):
             harvest.rejections.append(start)
             return None
-        guess = first_guess(self._still_known(start), self._tuning.process)
-        return self._study(tuple(frame for frame, _ in seen.values()), guess, harvest, None)
+        start, frames = self._still_known(start), tuple(frame for frame, _ in seen.values())
+        if not together(frames):
+            return self._study(frames, first_guess(start, self._tuning.process), harvest, None)
+        # One instant tells no speed. Cameras that disagree must not be explained by a speed times a clock's offset.
+        held = start.with_clocks(np.zeros_like(start.offsets_s), np.zeros_like(start.P[OFFSETS:, OFFSETS:]))
+        found = self._study(frames, first_guess(held, self._tuning.process), harvest, None)
+        if found is None:
+            return None
+        return found._replace(state=found.state.with_clocks(start.offsets_s, start.P[OFFSETS:, OFFSETS:]))
 
     def _hardly_seen(self, found: Update) -> bool:
         """Say whether for a while fewer sightings were made than make a pose: what seems another is soon a mistake."""
@@ -248,9 +255,7 @@ class Tracker:
         last = self._history.newest
         if last is None:
             return start
-        P = start.P.copy()
-        P[OFFSETS:, OFFSETS:] = last.P[OFFSETS:, OFFSETS:]
-        return replace(start, P=P, offsets_s=last.offsets_s, noise=last.noise)
+        return replace(start, noise=last.noise).with_clocks(last.offsets_s, last.P[OFFSETS:, OFFSETS:])
 
     def _watch_the_time(self, t_ns: int) -> None:
         """Lose the track when nothing of it was seen for too long."""

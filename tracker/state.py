@@ -93,6 +93,13 @@ class State:
             P[OFFSETS:, OFFSETS:] += np.outer(jump, jump)
         return replace(self, P=P)
 
+    def with_clocks(self, offsets_s: Array, covariance_s2: Array) -> State:
+        """Return the state with these clock offsets (cameras,), known to a covariance apart from all else."""
+        P = self.P.copy()
+        P[OFFSETS:], P[:, OFFSETS:] = 0.0, 0.0
+        P[OFFSETS:, OFFSETS:] = covariance_s2
+        return replace(self, P=P, offsets_s=offsets_s)
+
     @property
     def mean(self) -> Array:
         """Return the nominal state as one vector, for compiled code: p, R by rows, v, w, a, alpha, offsets.

@@ -79,6 +79,10 @@ def update(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig, pro
             best = _without_a_camera(ahead, batch, rig, probability)
     if best is None:
         detail = f"NIS {whole.nis:.0f} with {2 * len(near)} degrees of freedom"
+        if ahead.dt == 0.0:  # no track that sightings could contradict
+            detail = (
+                f"the cameras do not agree on where the balls are, {detail}: has one moved since it was calibrated?"
+            )
         return Rejected(Reason.FRAME_GATE, detail, ahead.state.t_ns)
     for sighting, gain in zip(batch.sightings, whole.gains() if best is not whole else (), strict=False):
         if not any(sighting is one for one in best.batch.sightings):

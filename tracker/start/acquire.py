@@ -70,6 +70,12 @@ def first_state(seen: Seen, rig: Rig, process: Process) -> State | Rejected:
     )
 
 
+def together(frames: Sequence[Frame]) -> bool:
+    """Say whether frames come from one trigger."""
+    times = [frame.t_ns for frame in frames]
+    return max(times) - min(times) <= TRIGGERED_NS
+
+
 def _clock_sigmas(seen: Seen, rig: Rig, process: Process) -> Array:
     """Return one sigma of the clock offset of each camera but the first [s].
 
