@@ -28,8 +28,7 @@ KNOCKS = (0.01, math.radians(0.5)), (0.003, math.radians(0.12))  # one sigma [m]
 MOST_EVIDENCE = 7.4  # of one sample [nats]
 AT_ODDS = 15.0  # of all recent ones: more than two can give [nats]
 NAMED = 6.0  # by which any story that leaves a camera out is worse than the best one [nats]
-
-
+TWO_AT_ONCE = 3.0  # where one camera was bumped, in one of twenty rooms a second was too [nats]
 LEAST_PX = 0.03  # no calibration is believed to fit balls better
 Hypothesis = tuple[int, ...]
 """The cameras that have moved."""
@@ -97,6 +96,7 @@ class Agreement:
         )
         hypotheses = self._alone + list(combinations(range(self._cameras), 2))
         evidence = np.array(self._evidence(whole, hypotheses))
+        evidence[len(self._alone) :] -= TWO_AT_ONCE
         by_others = [
             max(found for found, moved in zip(evidence.tolist(), hypotheses, strict=True) if camera not in moved)
             for camera in range(self._cameras)
