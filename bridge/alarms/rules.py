@@ -195,17 +195,20 @@ def _how_it_moved(camera: CameraReading, from_start: bool) -> str:
             f"was moved: the room stands {camera.shift_px:.1f} px off in its picture, "
             f"{camera.at_vehicle_mm:.0f} mm at the vehicle"
         )
-    where = "does not stand where the room file has it" if from_start else "was moved"
-    return f"{where}: its rays miss the balls"
+    return f"{_since_when(from_start)}: its rays miss the balls"
+
+
+def _since_when(from_start: bool) -> str:
+    return "does not stand where the room file has it" if from_start else "was moved"
 
 
 def _cameras_at_odds(now: Readings) -> Iterator[Finding]:
     if now.at_odds:
-        what = "does not stand where the room file has it" if now.from_start else "was moved"
+        miss = f"rays to the balls miss by {now.epipolar_px or 0:.1f} px, and nothing tells whose"
         yield Finding(
             "",
             Verdict.BAD,
-            f"a camera {what}: rays to the balls miss by {now.epipolar_px or 0:.1f} px, and nothing tells whose",
+            f"a camera {_since_when(now.from_start)}: {miss}",
             "land, see which hangs loose; then calibrate the room anew; hang something with corners where they look",
         )
 

@@ -7,6 +7,7 @@ from itertools import combinations, product
 
 import numpy as np
 
+from tracker.cadence import TOGETHER_NS
 from tracker.filter.manoeuvre import start_levels
 from tracker.filter.noise import start_noise
 from tracker.image.detect import Blob
@@ -20,8 +21,7 @@ from tracker.types import Array, Frame, Point, Reason, Rejected
 CENTROID_SIGMA_PX = 0.7  # of a colour blob's centroid, blur and shading included
 MISS_SIGMA = 4.0
 MAX_CANDIDATES = 8  # per ball and camera, largest first
-TRIGGERED_NS = 50_000  # stamps of two cameras this close come from one trigger
-TRIGGERED_S = 1e-4  # one sigma of what is left between their clocks
+TRIGGERED_S = 1e-4  # one sigma of what is left between the clocks of cameras with one trigger
 START_POSITION_M, START_ATTITUDE_RAD = 0.05, 0.3  # broad against the first fit, narrow against the room
 
 Seen = Mapping[int, tuple[Frame, Sequence[Sequence[Blob]]]]
@@ -73,7 +73,7 @@ def first_state(seen: Seen, rig: Rig, process: Process) -> State | Rejected:
 def together(frames: Sequence[Frame]) -> bool:
     """Say whether frames come from one trigger."""
     times = [frame.t_ns for frame in frames]
-    return max(times) - min(times) <= TRIGGERED_NS
+    return max(times) - min(times) <= TOGETHER_NS
 
 
 def _clock_sigmas(seen: Seen, rig: Rig, process: Process) -> Array:
@@ -84,7 +84,7 @@ def _clock_sigmas(seen: Seen, rig: Rig, process: Process) -> Array:
     stamps = {camera: frame.t_ns for camera, (frame, _) in seen.items()}
     sigmas = np.full(len(rig.cameras) - 1, process.clock_offset_s)
     for camera in range(1, len(rig.cameras)):
-        if camera in stamps and 0 in stamps and abs(stamps[camera] - stamps[0]) <= TRIGGERED_NS:
+        if camera in stamps and 0 in stamps and abs(stamps[camera] - stamps[0]) <= TOGETHER_NS:
             sigmas[camera - 1] = min(TRIGGERED_S, process.clock_offset_s)
     return sigmas
 
