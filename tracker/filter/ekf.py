@@ -1,6 +1,6 @@
 """The estimator: a multiplicative, iterated, gated extended Kalman filter on ball pixels.
 
-The state's error has 18 components and one clock offset for each camera but the first (see `state`); attitude errors
+The state's error has 24 components and one clock offset for each camera but the first (see `state`); attitude errors
 multiply. A measurement is any set of ball sightings, each at its own camera's time. Nothing is stored between calls: a
 state goes in, a new state comes out.
 
