@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.filter.clocks import given_clocks
-from tracker.filter.correction import innovation_covariance, path_noise
+from tracker.filter.correction import gathered_noise, innovation_covariance, path_noise
 from tracker.filter.manoeuvre import strengths
-from tracker.filter.matern import KINDS, MOTIONS, process_noise
+from tracker.filter.matern import MOTIONS, unit_noise
 from tracker.filter.measure import Indices, camera_table, pixels
 from tracker.filter.predict import Prediction
 from tracker.filter.sag import sag_noise
@@ -24,7 +24,7 @@ class Batch(NamedTuple):
 
     z (2n,), R (2n, 2n): pixels and the noise of fit and camera.  cameras, balls, lags_s (n,) [s].
     y (2n,): the prediction's innovation.  A (2n, 2n): its covariance without any manoeuvre.
-    B (s, 2n, 2n): what each strength of 1 adds to it, s = KINDS * MOTIONS, in the order of `process_noise`.
+    B (s, 2n, 2n): what each strength of 1 adds to it, (s,) as `process_noise` takes them.
     path (s, 2n, 2n): the part of B that lies between the state's time and the cameras'.
     doubt (2n, 2n): unknown speed times unknown clock offset, part of A.
     tops (s,): the envelope's strengths.
@@ -124,16 +124,16 @@ def _covariances(
         H (2n, size), P: slope of the sightings and coasted covariance.  covs_px: (2n, 2) the fits' own, one below the
         other.  noise: `State.noise`.  lags_s: (n,) of each sighting's true time after the state's.
     """
-    rows, size = H.shape
+    rows = len(H)
     R = np.zeros((rows, rows))
     for i in range(rows):
         first = i - i % 2
         R[i, first], R[i, first + 1] = covs_px[i, 0], covs_px[i, 1]
         R[i, i] += noise[cameras[i // 2], 0]
     path = path_noise(H, cameras, lags_s, T)
-    B, ones = np.empty(path.shape), np.eye(KINDS * MOTIONS)
+    B, unit = np.empty(path.shape), unit_noise(dt, T)
     for k in range(len(B)):
-        B[k] = innovation_covariance(H, process_noise(size, dt, T, ones[k]), path[k])
+        B[k] = path[k] + gathered_noise(H, unit[k // MOTIONS], k % MOTIONS)
     doubt = _doubt(P, given_clocks(P), H, cameras)
     return R, innovation_covariance(H, P, R + doubt), B, path, doubt
 

@@ -88,6 +88,23 @@ def weighed(y: Array, H: Array, P: Array, R: Array) -> tuple[Array, Array, float
     return u, inverse, nis
 
 
+@compiled("f8[:, ::1](f8[:, ::1], f8[:, ::1], i8)")
+def gathered_noise(H: Array, unit: Array, motion: int) -> Array:
+    """Return H Q H' (2n, 2n) [px^2] for the process noise of one motion, unit (4, 4) on each axis, see `unit_noise`."""
+    rows = len(H)
+    slope, HQ, noise = np.empty((rows, 12)), np.zeros((rows, 12)), np.empty((rows, rows))
+    for i in range(rows):
+        for a in range(4):
+            slope[i, 3 * a : 3 * a + 3] = H[i, 6 * a + 3 * motion : 6 * a + 3 * motion + 3]
+        for a in range(4):
+            for b in range(4):
+                for axis in range(3):
+                    HQ[i, 3 * b + axis] += slope[i, 3 * a + axis] * unit[a, b]
+        for j in range(i + 1):
+            noise[i, j] = noise[j, i] = dot(HQ[i], slope[j])
+    return noise
+
+
 @compiled("f8[:, :, ::1](f8[:, ::1], i8[::1], f8[::1], f8)")
 def path_noise(H: Array, cameras: Indices, lags_s: Array, T: float) -> Array:
     """Return the covariances (KINDS * MOTIONS, 2n, 2n) [px^2] of an unknown path from the state's time to the cameras'.
@@ -96,16 +113,17 @@ def path_noise(H: Array, cameras: Indices, lags_s: Array, T: float) -> Array:
     """
     n = len(cameras)
     path = np.zeros((KINDS * MOTIONS, 2 * n, 2 * n))
-    for i in range(2 * n):
-        s = i // 2
+    for s in range(n):
         if lags_s[s] == 0.0:
             continue
         unit = unit_noise(abs(lags_s[s]), T)
-        for j in range(2 * n):
-            if cameras[j // 2] == cameras[s]:
-                for axis in range(6):
-                    for kind in range(KINDS):
-                        path[kind * MOTIONS + axis // 3, i, j] += unit[kind, 0, 0] * H[i, axis] * H[j, axis]
+        for i in range(2 * s, 2 * s + 2):
+            for j in range(2 * n):
+                if cameras[j // 2] == cameras[s]:
+                    for axis in range(6):
+                        by_axis = H[i, axis] * H[j, axis]
+                        for kind in range(KINDS):
+                            path[kind * MOTIONS + axis // 3, i, j] += unit[kind, 0, 0] * by_axis
     return path
 
 
@@ -194,8 +212,9 @@ def _linear(P: Array, H: Array, R: Array, y: Array, dx: Array, variances: Array)
     HP, S = np.zeros((m, n + 1)), R.copy()
     for i in range(m):
         for k in range(n):
-            for j in range(n):
-                HP[i, j] += H[i, k] * P[k, j]
+            if H[i, k] != 0.0:
+                for j in range(n):
+                    HP[i, j] += H[i, k] * P[k, j]
         for j in range(i + 1):  # of S no more than the lower half is asked for
             S[i, j] += dot(HP[i, :n], H[j])
         HP[i, n] = y[i]
