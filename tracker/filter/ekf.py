@@ -52,9 +52,10 @@ def update(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig, pro
         Update; Rejected FRAME_GATE when no choice of sightings fits the prediction.
     Source: each ball is gated on its innovation (Mahalanobis distance, 2 degrees of freedom), as far as the envelope
         goes. The rest is fitted together. When the sum of squares does not fit its chi-square, the smallest set of
-        sightings is left out with which it does, of equal sets the one that leaves least; sets of up to a third of
-        all are tried, among those without which the sum would fall most, then whole cameras. The prior is broad
-        against a pixel, so it is the marker's rigid shape that finds the liars. A camera of which most lie shows
+        sightings is left out with which it does, of equal sets the one that leaves least; sets of up to a third of all
+        are tried, among those without which the sum would fall most, then whole cameras. Where a gate shuts a camera
+        out, it lies or the vehicle left the envelope, and the others must fit the noise expected before. The prior is
+        broad against a pixel, so it is the marker's rigid shape that finds the liars. A camera of which most lie shows
         another time, or the other camera does: then it is between cameras, and none of its sightings is picked out.
     """
     if not sightings:
@@ -68,13 +69,14 @@ def update(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig, pro
     rejected = [_left_out(sightings[i], rig, distances2[i], "from the prediction") for i in far]
     if not near:
         return Rejected(Reason.FRAME_GATE, "no sighting near the prediction", ahead.state.t_ns)
-    batch = batch.part(near)
-    whole = fit(ahead, batch, rig)
+    seen, batch = batch.cameras, batch.part(near)
+    adapt = set(batch.cameras.tolist()) == set(seen.tolist())
+    whole = fit(ahead, batch, rig, adapt=adapt)
     if whole is None:
         return Rejected(Reason.FRAME_GATE, "the fit runs away", ahead.state.t_ns)
     best: Fit | None = whole
     if not _fits(whole, probability):
-        best = _without_few(ahead, whole, rig, probability)
+        best = _without_few(ahead, whole, rig, probability, adapt=adapt)
         if best is None or _splits_a_camera(batch, best.batch):
             best = _without_a_camera(ahead, batch, rig, probability)
     if best is None:
@@ -92,14 +94,14 @@ def _fits(one: Fit, probability: float) -> bool:
     return one.nis <= chi2_limit(probability, len(one.u))
 
 
-def _without_few(ahead: Prediction, whole: Fit, rig: Rig, probability: float) -> Fit | None:
+def _without_few(ahead: Prediction, whole: Fit, rig: Rig, probability: float, *, adapt: bool) -> Fit | None:
     """Return the best fit without up to a third of the sightings, None when none fits."""
     batch = whole.batch
     everyone = range(len(batch.sightings))
     suspects = np.argsort(-whole.gains())[:MAX_SUSPECTS].tolist()
     for count in range(1, len(everyone) // 3 + 1):
         tried = [
-            fit(ahead, batch.part([i for i in everyone if i not in left_out]), rig)
+            fit(ahead, batch.part([i for i in everyone if i not in left_out]), rig, adapt=adapt)
             for left_out in combinations(suspects, count)
         ]
         fitting = [one for one in tried if one is not None and _fits(one, probability)]
