@@ -22,7 +22,7 @@ from tracker.types import Array
 
 LEVELS = 9
 STEP = 3.0  # of sigma from one level to the next
-SUDDEN_S = 1.0 / 15.0  # within it the briskest manoeuvre begins; one a third as brisk takes three times as long
+SUDDEN_S = 0.1  # within it the briskest manoeuvre begins; one a third as brisk takes three times as long
 CHANGE_S = 0.7  # a level is kept for about so long
 RARER = 1.0 / 3.0  # a change is, for each level that it goes further
 
