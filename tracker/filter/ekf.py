@@ -70,13 +70,14 @@ def update(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig, pro
     if not near:
         return Rejected(Reason.FRAME_GATE, "no sighting near the prediction", ahead.state.t_ns)
     seen, batch = batch.cameras, batch.part(near)
-    adapt = set(batch.cameras.tolist()) == set(seen.tolist())
-    whole = fit(ahead, batch, rig, adapt=adapt)
+    if set(batch.cameras.tolist()) != set(seen.tolist()) and not _expected(ahead, batch, rig, probability):
+        return Rejected(Reason.FRAME_GATE, "a camera is shut out, and the others see a manoeuvre", ahead.state.t_ns)
+    whole = fit(ahead, batch, rig)
     if whole is None:
         return Rejected(Reason.FRAME_GATE, "the fit runs away", ahead.state.t_ns)
     best: Fit | None = whole
     if not _fits(whole, probability):
-        best = _without_few(ahead, whole, rig, probability, adapt=adapt)
+        best = _without_few(ahead, whole, rig, probability)
         if best is None or _splits_a_camera(batch, best.batch):
             best = _without_a_camera(ahead, batch, rig, probability)
     if best is None:
@@ -94,14 +95,20 @@ def _fits(one: Fit, probability: float) -> bool:
     return one.nis <= chi2_limit(probability, len(one.u))
 
 
-def _without_few(ahead: Prediction, whole: Fit, rig: Rig, probability: float, *, adapt: bool) -> Fit | None:
+def _expected(ahead: Prediction, batch: Batch, rig: Rig, probability: float) -> bool:
+    """Say whether sightings fit the noise expected before: manoeuvres explain much of what one camera alone says."""
+    one = fit(ahead, batch, rig, adapt=False)
+    return one is not None and _fits(one, probability)
+
+
+def _without_few(ahead: Prediction, whole: Fit, rig: Rig, probability: float) -> Fit | None:
     """Return the best fit without up to a third of the sightings, None when none fits."""
     batch = whole.batch
     everyone = range(len(batch.sightings))
     suspects = np.argsort(-whole.gains())[:MAX_SUSPECTS].tolist()
     for count in range(1, len(everyone) // 3 + 1):
         tried = [
-            fit(ahead, batch.part([i for i in everyone if i not in left_out]), rig, adapt=adapt)
+            fit(ahead, batch.part([i for i in everyone if i not in left_out]), rig)
             for left_out in combinations(suspects, count)
         ]
         fitting = [one for one in tried if one is not None and _fits(one, probability)]
