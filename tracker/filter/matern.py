@@ -5,8 +5,9 @@ which two frames tell and free-running cameras need to bridge half a frame; wher
 exp(-|t| / T) does, and T is the integral of either. A manoeuvre may begin between two frames: white noise that drives
 the acceleration itself comes on top.
 
-Source: Hartikainen, Sarkka, "Kalman filtering and smoothing solutions to temporal Gaussian process regression models",
-    IEEE MLSP (2010), 4.1: with r = 2 / T, acceleration a and jerk j go by
+Source: Singer, "Estimating optimal tracking filter performance for manned maneuvering targets", IEEE Trans. AES 6
+    (1970), for accelerations that fade; Hartikainen, Sarkka, "Kalman filtering and smoothing solutions to temporal
+    Gaussian process regression models", IEEE MLSP (2010), 4.1: with r = 2 / T, acceleration a and jerk j go by
 
         da = j dt + sudden,  dj = -(r^2 a + 2 r j) dt + smooth,  smooth being white of density 4 r^3 s.     (1)
 """
