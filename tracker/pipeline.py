@@ -274,7 +274,7 @@ class Tracker:
             v_BinW=mean[12:15],
             w_BinB=mean[15:18],
             covariance=covariance,
-            clock_offsets_s=mean[24:],
+            clock_offsets_s=mean[30:],
             clock_sigmas_s=sigmas_s,
             state=self._track,
             reset_counter=self._continuity.resets,

@@ -12,7 +12,8 @@ from tracker.types import Array
 
 POSITION, ATTITUDE, VELOCITY, RATE = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
 ACCELERATION, ANGULAR_ACCELERATION = slice(12, 15), slice(15, 18)
-OFFSETS = 18  # errors of the clock offsets of cameras 1, 2, ... begin here
+JERK, ANGULAR_JERK = slice(18, 21), slice(21, 24)
+OFFSETS = 24  # errors of the clock offsets of cameras 1, 2, ... begin here
 REPORTED = 12  # the first of the errors, which `Estimate.covariance` is of
 
 
@@ -45,8 +46,8 @@ class State:
 
     p_BinW (3,) [m], R_BtoW (3, 3), v_BinW (3,) [m/s], w_BinB (3,) [rad/s]; P (n, n) of the errors in the order
     position (W), rotation vector (B, R = R_hat exp(theta)), velocity (W), rate (B), acceleration (W), angular
-    acceleration (B), clock offsets of cameras 1, 2, ...; n = 17 + cameras.
-    a_BinW (3,) [m/s^2], alpha_BinB (3,) [rad/s^2].
+    acceleration (B), jerk (W), angular jerk (B), clock offsets of cameras 1, 2, ...; n = 23 + cameras.
+    a_BinW (3,) [m/s^2], alpha_BinB (3,) [rad/s^2], j_BinW (3,) [m/s^3], beta_BinB (3,) [rad/s^3].
     offsets_s: (cameras,) a frame stamped t shows the vehicle at t + offset; camera 0's clock counts, so its is 0 [s].
     levels: (2, levels) probability of each level of `manoeuvre`, for translation and for rotation.
     noise: (cameras, 2) variance that a camera adds to each fit, and how much is known of it, see `noise`.
@@ -61,6 +62,8 @@ class State:
     P: Array
     a_BinW: Array = field(default_factory=lambda: np.zeros(3))
     alpha_BinB: Array = field(default_factory=lambda: np.zeros(3))
+    j_BinW: Array = field(default_factory=lambda: np.zeros(3))
+    beta_BinB: Array = field(default_factory=lambda: np.zeros(3))
     offsets_s: Array = field(default_factory=lambda: np.zeros(1))
     levels: Array = field(default_factory=lambda: np.ones((2, 1)))
     noise: Array = field(default_factory=lambda: np.zeros((1, 2)))
@@ -78,6 +81,8 @@ class State:
             w_BinB=self.w_BinB + dx[RATE],
             a_BinW=self.a_BinW + dx[ACCELERATION],
             alpha_BinB=self.alpha_BinB + dx[ANGULAR_ACCELERATION],
+            j_BinW=self.j_BinW + dx[JERK],
+            beta_BinB=self.beta_BinB + dx[ANGULAR_JERK],
             offsets_s=offsets_s,
         )
 
@@ -102,7 +107,7 @@ class State:
 
     @property
     def mean(self) -> Array:
-        """Return the nominal state as one vector, for compiled code: p, R by rows, v, w, a, alpha, offsets.
+        """Return the nominal state as one vector, for compiled code: p, R by rows, v, w, a, alpha, j, beta, offsets.
 
         Only to be read: it is the vector that `at_mean` was given, if the state's parts are still parts of that.
         """
@@ -114,10 +119,15 @@ class State:
             and self.w_BinB.base is whole
             and self.a_BinW.base is whole
             and self.alpha_BinB.base is whole
+            and self.j_BinW.base is whole
+            and self.beta_BinB.base is whole
             and self.offsets_s.base is whole
         ):
             return whole
-        parts = self.p_BinW, self.R_BtoW, self.v_BinW, self.w_BinB, self.a_BinW, self.alpha_BinB, self.offsets_s
+        parts = (
+            self.p_BinW, self.R_BtoW, self.v_BinW, self.w_BinB, self.a_BinW, self.alpha_BinB, self.j_BinW,
+            self.beta_BinB, self.offsets_s,
+        )  # fmt: skip
         return np.concatenate([part.reshape(-1) for part in parts])
 
     def with_mean(self, mean: Array) -> State:
@@ -130,14 +140,16 @@ class State:
             w_BinB=mean[15:18],
             a_BinW=mean[18:21],
             alpha_BinB=mean[21:24],
-            offsets_s=mean[24:],
+            j_BinW=mean[24:27],
+            beta_BinB=mean[27:30],
+            offsets_s=mean[30:],
         )
 
     def at_mean(self, t_ns: int, mean: Array, P: Array, levels: Array, noise: Array) -> State:
         """Return the state of t_ns, with all that an update may change; quicker than `dataclasses.replace`."""
         return State(
             t_ns, mean[0:3], mean[3:12].reshape(3, 3), mean[12:15], mean[15:18], P, mean[18:21], mean[21:24],
-            mean[24:], levels, noise, self.manoeuvre_s,
+            mean[24:27], mean[27:30], mean[30:], levels, noise, self.manoeuvre_s,
         )  # fmt: skip
 
 
@@ -153,5 +165,7 @@ def start_covariance(process: Process, offsets_s: Array, position_m: float, atti
     sigma[RATE] = process.initial_rate_rad_s
     sigma[ACCELERATION] = process.acceleration_m_s2
     sigma[ANGULAR_ACCELERATION] = process.angular_acceleration_rad_s2
+    sigma[JERK] = 2.0 * process.acceleration_m_s2 / process.manoeuvre_s
+    sigma[ANGULAR_JERK] = 2.0 * process.angular_acceleration_rad_s2 / process.manoeuvre_s
     sigma[OFFSETS:] = offsets_s
     return np.diag(sigma**2)

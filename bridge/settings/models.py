@@ -144,7 +144,7 @@ class ProcessSettings(Section):
 
     acceleration_m_s2: Positive = 10.0
     angular_acceleration_rad_s2: Positive = 40.0
-    manoeuvre_ms: Positive = 200.0
+    manoeuvre_ms: Positive = 400.0
     initial_speed_m_s: Positive = 2.5
     initial_rate_rad_s: Positive = 1.6
     tilt_deg: Positive = 20.0

@@ -21,7 +21,7 @@ SECOND_NS = 1_000_000_000
 PROCESS = Process(
     acceleration_m_s2=10.0,
     angular_acceleration_rad_s2=40.0,
-    manoeuvre_s=0.2,
+    manoeuvre_s=0.4,
     initial_speed_m_s=2.5,
     initial_rate_rad_s=1.6,
     tilt_rad=np.radians(20.0),
@@ -76,8 +76,9 @@ def state(
 
 
 def covariance(position_m: float, attitude_rad: float, speed_m_s: float, rate_rad_s: float) -> Array:
-    """Return P (19, 19) for two cameras of these sigmas, with next to no acceleration and offset."""
-    return np.diag(np.append(np.repeat([position_m, attitude_rad, speed_m_s, rate_rad_s, 1e-6, 1e-6], 3), 1e-9) ** 2)
+    """Return P (25, 25) for two cameras of these sigmas, with next to no acceleration, jerk and offset."""
+    motion = np.repeat([position_m, attitude_rad, speed_m_s, rate_rad_s, *[1e-6] * 4], 3)
+    return np.diag(np.append(motion, 1e-9) ** 2)
 
 
 def at(truth: State, t_ns: int) -> State:

@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.filter.clocks import given_clocks
-from tracker.filter.correction import innovation_covariance, path_noise
-from tracker.filter.manoeuvre import variances
+from tracker.filter.correction import gathered_noise, innovation_covariance, path_noise
+from tracker.filter.manoeuvre import strengths
+from tracker.filter.matern import MOTIONS, unit_noise
 from tracker.filter.measure import Indices, camera_table, pixels
 from tracker.filter.predict import Prediction
 from tracker.filter.sag import sag_noise
-from tracker.filter.singer import process_noise
 from tracker.maths.compiled import compiled
 from tracker.rig import Rig
 from tracker.state import OFFSETS
@@ -24,10 +24,10 @@ class Batch(NamedTuple):
 
     z (2n,), R (2n, 2n): pixels and the noise of fit and camera.  cameras, balls, lags_s (n,) [s].
     y (2n,): the prediction's innovation.  A (2n, 2n): its covariance without any manoeuvre.
-    B (2, 2n, 2n): what accelerations of variance 1 add to it, of translation and of rotation.
-    path (2, 2n, 2n): the part of B that lies between the state's time and the cameras'.
+    B (s, 2n, 2n): what each strength of 1 adds to it, (s,) as `process_noise` takes them.
+    path (s, 2n, 2n): the part of B that lies between the state's time and the cameras'.
     doubt (2n, 2n): unknown speed times unknown clock offset, part of A.
-    tops (2,): the envelope's variances.
+    tops (s,): the envelope's strengths.
     """
 
     sightings: tuple[BallSighting, ...]
@@ -74,7 +74,7 @@ def make_batch(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig)
         state.mean, state.P, ahead.P_coasted, ahead.dt, T, z, covs_px, state.noise, cameras, balls, lags_s,
         camera_table(rig), ahead.points_of(rig), ahead.turn_open,
     )  # fmt: skip
-    return Batch(sightings, z, R, cameras, balls, lags_s, y, A, B, path, doubt, variances(ahead.process)[:, -1])
+    return Batch(sightings, z, R, cameras, balls, lags_s, y, A, B, path, doubt, strengths(ahead.process)[:, -1])
 
 
 @compiled("f8[::1](f8[::1], f8[:, ::1], f8[:, :, ::1], f8[:])")
@@ -83,9 +83,9 @@ def _distances2(y: Array, A: Array, B: Array, tops: Array) -> Array:
     found = np.empty(len(y) // 2)
     for s in range(len(found)):
         i = 2 * s
-        a = A[i, i] + tops[0] * B[0, i, i] + tops[1] * B[1, i, i]
-        b = A[i, i + 1] + tops[0] * B[0, i, i + 1] + tops[1] * B[1, i, i + 1]
-        d = A[i + 1, i + 1] + tops[0] * B[0, i + 1, i + 1] + tops[1] * B[1, i + 1, i + 1]
+        a, b, d = A[i, i], A[i, i + 1], A[i + 1, i + 1]
+        for k in range(len(B)):
+            a, b, d = a + tops[k] * B[k, i, i], b + tops[k] * B[k, i, i + 1], d + tops[k] * B[k, i + 1, i + 1]
         u, v = y[i], y[i + 1]
         found[s] = (d * u * u - 2.0 * b * u * v + a * v * v) / (a * d - b * b)
     return found
@@ -124,17 +124,16 @@ def _covariances(
         H (2n, size), P: slope of the sightings and coasted covariance.  covs_px: (2n, 2) the fits' own, one below the
         other.  noise: `State.noise`.  lags_s: (n,) of each sighting's true time after the state's.
     """
-    rows, size = H.shape
+    rows = len(H)
     R = np.zeros((rows, rows))
     for i in range(rows):
         first = i - i % 2
         R[i, first], R[i, first + 1] = covs_px[i, 0], covs_px[i, 1]
         R[i, i] += noise[cameras[i // 2], 0]
-    path, B = np.empty((2, rows, rows)), np.empty((2, rows, rows))
-    for k in range(2):
-        path[k] = path_noise(H, cameras, lags_s, T, 3 * k)
-        unit = process_noise(size, dt, T, 1.0 - k, float(k))
-        B[k] = innovation_covariance(H, unit, path[k])
+    path = path_noise(H, cameras, lags_s, T)
+    B, unit = np.empty(path.shape), unit_noise(dt, T)
+    for k in range(len(B)):
+        B[k] = path[k] + gathered_noise(H, unit[k // MOTIONS], k % MOTIONS)
     doubt = _doubt(P, given_clocks(P), H, cameras)
     return R, innovation_covariance(H, P, R + doubt), B, path, doubt
 
@@ -155,7 +154,7 @@ def _compared(
     h, H = pixels(mean, T, cameras, balls, lags_s, table, points_inB)
     true_lags_s = np.empty(len(lags_s))
     for s in range(len(lags_s)):
-        true_lags_s[s] = lags_s[s] + mean[24 + cameras[s]]
+        true_lags_s[s] = lags_s[s] + mean[30 + cameras[s]]
     R, A, B, path, doubt = _covariances(H, P_coasted, dt, T, covs_px, noise, cameras, true_lags_s)
     if turn_open:
         A += sag_noise(H, balls, points_inB, mean, P)

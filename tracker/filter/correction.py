@@ -6,15 +6,15 @@ import math
 
 import numpy as np
 
+from tracker.filter.matern import KINDS, MOTIONS, unit_noise
 from tracker.filter.measure import Indices, pixels
-from tracker.filter.singer import unit_noise
 from tracker.maths.compiled import compiled
 from tracker.maths.so3_compiled import turn_into
 from tracker.maths.solve import dot
 from tracker.types import Array
 
 MAX_ITERATIONS = 8
-CONVERGED_SIGMA = 0.02  # stop when the last step is this small against the posterior's own sigma
+CONVERGED_SIGMA = 0.01  # stop when the last step is this small against the posterior's own sigma
 TILT_ROWS = 2
 
 
@@ -88,66 +88,51 @@ def weighed(y: Array, H: Array, P: Array, R: Array) -> tuple[Array, Array, float
     return u, inverse, nis
 
 
-@compiled("f8[:, ::1](f8[:, ::1], i8[::1], f8[::1], f8, i8)")
-def path_noise(H: Array, cameras: Indices, lags_s: Array, T: float, first: int) -> Array:
-    """Return the covariance (2n, 2n) [px^2] of what an unknown path adds between the state's time and the cameras'.
+@compiled("f8[:, ::1](f8[:, ::1], f8[:, ::1], i8)")
+def gathered_noise(H: Array, unit: Array, motion: int) -> Array:
+    """Return H Q H' (2n, 2n) [px^2] for the process noise of one motion, unit (4, 4) on each axis, see `unit_noise`."""
+    rows = len(H)
+    slope, HQ, noise = np.empty((rows, 12)), np.zeros((rows, 12)), np.empty((rows, rows))
+    for i in range(rows):
+        for a in range(4):
+            slope[i, 3 * a : 3 * a + 3] = H[i, 6 * a + 3 * motion : 6 * a + 3 * motion + 3]
+        for a in range(4):
+            for b in range(4):
+                for axis in range(3):
+                    HQ[i, 3 * b + axis] += slope[i, 3 * a + axis] * unit[a, b]
+        for j in range(i + 1):
+            noise[i, j] = noise[j, i] = dot(HQ[i], slope[j])
+    return noise
 
-    Args:
-        lags_s: (n,) of each sighting's true time after the state's.
-        first: error from which three are moved by an acceleration of variance 1: 0 for place, 3 for attitude.
+
+@compiled("f8[:, :, ::1](f8[:, ::1], i8[::1], f8[::1], f8)")
+def path_noise(H: Array, cameras: Indices, lags_s: Array, T: float) -> Array:
+    """Return the covariances (KINDS * MOTIONS, 2n, 2n) [px^2] of an unknown path from the state's time to the cameras'.
+
+    Each is by one strength of 1, in the order of `process_noise`.  lags_s: (n,) of each sighting's true time.
     """
     n = len(cameras)
-    R = np.zeros((2 * n, 2 * n))
+    path = np.zeros((KINDS * MOTIONS, 2 * n, 2 * n))
     for s in range(n):
-        noise = unit_noise(abs(lags_s[s]), T)[0]
-        for r in range(n):
-            if cameras[r] == cameras[s] and noise > 0.0:
-                for k in range(2):
-                    for m in range(2):
-                        for i in range(first, first + 3):
-                            R[2 * s + k, 2 * r + m] += noise * H[2 * s + k, i] * H[2 * r + m, i]
-    return R
-
-
-@compiled("f8[:, ::1](f8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], UniTuple(f8, 2))")
-def log_likelihoods(y: Array, A: Array, B: Array, variances: Array, means: tuple[float, float]) -> Array:
-    """Return the log likelihoods (2, levels) of innovations y (n,) under S = A + s B[0] + r B[1], up to a constant.
-
-    Args:
-        B: (2, n, n) by a variance of 1 of translation and of rotation.
-        variances: (2, levels) tried of one, while the other has its mean.  means: (2,).
-    """
-    n, levels = len(y), variances.shape[1]
-    tries = 2 * levels  # of every level of one, then of the other; all go through Cholesky's factors side by side
-    s, r = np.full(tries, means[0]), np.full(tries, means[1])
-    s[:levels], r[levels:] = variances[0], variances[1]
-    found, L, white = np.zeros(tries), np.empty((n, n, tries)), np.empty((n, tries))
-    for i in range(n):
-        white[i] = y[i]
-        for j in range(i + 1):
-            a, by_s, by_r = A[i, j], B[0, i, j], B[1, i, j]
-            for t in range(tries):
-                L[i, j, t] = a + s[t] * by_s + r[t] * by_r
-            for k in range(j):
-                for t in range(tries):
-                    L[i, j, t] -= L[i, k, t] * L[j, k, t]
-            if j < i:
-                for t in range(tries):
-                    L[i, j, t] /= L[j, j, t]
-                    white[i, t] -= L[i, j, t] * white[j, t]
-        for t in range(tries):
-            L[i, i, t] = math.sqrt(L[i, i, t])
-            white[i, t] /= L[i, i, t]
-            found[t] -= 0.5 * white[i, t] ** 2 + math.log(L[i, i, t])
-    return found.reshape(2, levels)
+        if lags_s[s] == 0.0:
+            continue
+        unit = unit_noise(abs(lags_s[s]), T)
+        for i in range(2 * s, 2 * s + 2):
+            for j in range(2 * n):
+                if cameras[j // 2] == cameras[s]:
+                    for axis in range(6):
+                        by_axis = H[i, axis] * H[j, axis]
+                        for kind in range(KINDS):
+                            path[kind * MOTIONS + axis // 3, i, j] += unit[kind, 0, 0] * by_axis
+    return path
 
 
 @compiled("f8[::1](f8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")
 def moved(mean: Array, dx: Array, E: Array, J_r: Array) -> Array:
     """Return the mean with the error dx put in, and write exp and right Jacobian of its turn into E and J_r.
 
-    The body's rate and angular acceleration stay what they were as seen from the room, to all orders of the turn: they
-    become E' (w + dw + theta x w). A turn that no pixel sees must not alter how the seen balls go on.
+    The body's rate, angular acceleration and jerk stay what they were as seen from the room, to all orders of the
+    turn: they become E' (w + dw + theta x w). A turn that no pixel sees must not alter how the seen balls go on.
     """
     now = mean.copy()
     turn_into(dx[3], dx[4], dx[5], E, J_r)
@@ -155,9 +140,9 @@ def moved(mean: Array, dx: Array, E: Array, J_r: Array) -> Array:
         now[i] += dx[i]
         for j in range(3):
             now[3 + 3 * i + j] = mean[3 + 3 * i] * E[0, j] + mean[4 + 3 * i] * E[1, j] + mean[5 + 3 * i] * E[2, j]
-    now[12:24] += dx[6:18]
-    now[25:] += dx[18:]
-    for first in (15, 21):
+    now[12:30] += dx[6:24]
+    now[31:] += dx[24:]
+    for first in (15, 21, 27):
         a, b, c = mean[first], mean[first + 1], mean[first + 2]
         x = now[first] + dx[4] * c - dx[5] * b
         y = now[first + 1] + dx[5] * a - dx[3] * c
@@ -176,7 +161,7 @@ def moved_slope(mean: Array, now: Array, E: Array, J_r: Array, size: int) -> Arr
     """
     G = np.eye(size)
     G[3:6, 3:6] = J_r
-    for rows, first in ((9, 15), (15, 21)):
+    for rows, first in ((9, 15), (15, 21), (21, 27)):
         w, then = mean[first : first + 3], now[first : first + 3]
         for i in range(3):
             p, q = (i + 1) % 3, (i + 2) % 3
@@ -201,6 +186,25 @@ def _tilt(mean: Array, H: Array, y: Array) -> None:
     H[rows - 1, 3], H[rows - 1, 4], H[rows - 1, 5] = r[2], 0.0, -r[0]
 
 
+@compiled("void(f8[:, ::1], f8[:, ::1])")
+def _told_from_prior(H: Array, G: Array) -> None:
+    """Write H G into H, for G from `moved_slope`, which mixes nothing but the turn and its derivatives."""
+    through = np.empty(3)
+    for i in range(len(H)):
+        for j in range(3):
+            through[j] = 0.0
+            for first in (3, 9, 15, 21):
+                for k in range(first, first + 3):
+                    through[j] += H[i, k] * G[k, 3 + j]
+        H[i, 3:6] = through
+        for first in (9, 15, 21):
+            for j in range(3):
+                through[j] = 0.0
+                for k in range(first, first + 3):
+                    through[j] += H[i, k] * G[k, first + j]
+            H[i, first : first + 3] = through
+
+
 @compiled("Tuple((f8[::1], f8))(f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1])")
 def _linear(P: Array, H: Array, R: Array, y: Array, dx: Array, variances: Array) -> tuple[Array, float]:
     """Return P H' S^-1 y (size,) and its largest step from dx in posterior sigmas; write the posterior variances."""
@@ -208,8 +212,9 @@ def _linear(P: Array, H: Array, R: Array, y: Array, dx: Array, variances: Array)
     HP, S = np.zeros((m, n + 1)), R.copy()
     for i in range(m):
         for k in range(n):
-            for j in range(n):
-                HP[i, j] += H[i, k] * P[k, j]
+            if H[i, k] != 0.0:
+                for j in range(n):
+                    HP[i, j] += H[i, k] * P[k, j]
         for j in range(i + 1):  # of S no more than the lower half is asked for
             S[i, j] += dot(HP[i, :n], H[j])
         HP[i, n] = y[i]
@@ -247,7 +252,7 @@ def likeliest(
     size, rows = len(P), len(R)
     dx, y, variances = np.zeros(size), np.zeros(rows), np.zeros(size)
     H = np.zeros((rows, size))
-    E, J_r, through = np.empty((3, 3)), np.empty((3, 3)), np.empty(9)
+    E, J_r = np.empty((3, 3)), np.empty((3, 3))
     for _ in range(MAX_ITERATIONS):
         now = moved(mean, dx, E, J_r)
         G = moved_slope(mean, now, E, J_r, size)
@@ -259,17 +264,8 @@ def likeliest(
         _tilt(now, H, y)
         for i in range(rows - TILT_ROWS):
             y[i] = z[i] - h[i]
+        _told_from_prior(H, G)  # (4)
         for i in range(rows):
-            for j in range(3):
-                by_turn = 0.0
-                for k in range(3):
-                    by_turn += H[i, 3 + k] * G[3 + k, 3 + j] + H[i, 9 + k] * G[9 + k, 3 + j]
-                    by_turn += H[i, 15 + k] * G[15 + k, 3 + j]
-                through[j] = by_turn
-                through[3 + j] = H[i, 9] * G[9, 9 + j] + H[i, 10] * G[10, 9 + j] + H[i, 11] * G[11, 9 + j]
-                through[6 + j] = H[i, 15] * G[15, 15 + j] + H[i, 16] * G[16, 15 + j] + H[i, 17] * G[17, 15 + j]
-            for j in range(3):
-                H[i, 3 + j], H[i, 9 + j], H[i, 15 + j] = through[j], through[3 + j], through[6 + j]  # (4)
             for j in range(size):
                 y[i] += H[i, j] * dx[j]  # (3)
         new, biggest = _linear(P, H, R, y, dx, variances)

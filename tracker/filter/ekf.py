@@ -1,6 +1,6 @@
 """The estimator: a multiplicative, iterated, gated extended Kalman filter on ball pixels.
 
-The state's error has 18 components and one clock offset for each camera but the first (see `state`); attitude errors
+The state's error has 24 components and one clock offset for each camera but the first (see `state`); attitude errors
 multiply. A measurement is any set of ball sightings, each at its own camera's time. Nothing is stored between calls: a
 state goes in, a new state comes out.
 
@@ -52,9 +52,10 @@ def update(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig, pro
         Update; Rejected FRAME_GATE when no choice of sightings fits the prediction.
     Source: each ball is gated on its innovation (Mahalanobis distance, 2 degrees of freedom), as far as the envelope
         goes. The rest is fitted together. When the sum of squares does not fit its chi-square, the smallest set of
-        sightings is left out with which it does, of equal sets the one that leaves least; sets of up to a third of
-        all are tried, among those without which the sum would fall most, then whole cameras. The prior is broad
-        against a pixel, so it is the marker's rigid shape that finds the liars. A camera of which most lie shows
+        sightings is left out with which it does, of equal sets the one that leaves least; sets of up to a third of all
+        are tried, among those without which the sum would fall most, then whole cameras. Where a gate shuts a camera
+        out, it lies or the vehicle left the envelope, and the others must fit the noise expected before. The prior is
+        broad against a pixel, so it is the marker's rigid shape that finds the liars. A camera of which most lie shows
         another time, or the other camera does: then it is between cameras, and none of its sightings is picked out.
     """
     if not sightings:
@@ -68,15 +69,13 @@ def update(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig, pro
     rejected = [_left_out(sightings[i], rig, distances2[i], "from the prediction") for i in far]
     if not near:
         return Rejected(Reason.FRAME_GATE, "no sighting near the prediction", ahead.state.t_ns)
-    batch = batch.part(near)
+    seen, batch = batch.cameras, batch.part(near)
+    if set(batch.cameras.tolist()) != set(seen.tolist()) and not _expected(ahead, batch, rig, probability):
+        return Rejected(Reason.FRAME_GATE, "a camera is shut out, and the others see a manoeuvre", ahead.state.t_ns)
     whole = fit(ahead, batch, rig)
     if whole is None:
         return Rejected(Reason.FRAME_GATE, "the fit runs away", ahead.state.t_ns)
-    best: Fit | None = whole
-    if not _fits(whole, probability):
-        best = _without_few(ahead, whole, rig, probability)
-        if best is None or _splits_a_camera(batch, best.batch):
-            best = _without_a_camera(ahead, batch, rig, probability)
+    best = whole if _fits(whole, probability) else _without_liars(ahead, whole, rig, probability)
     if best is None:
         detail = f"NIS {whole.nis:.0f} with {2 * len(near)} degrees of freedom"
         if ahead.dt == 0.0:  # no track that sightings could contradict
@@ -94,6 +93,20 @@ def update(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig, pro
 def _fits(one: Fit, probability: float) -> bool:
     """Say whether a fit's sum of squares is one that true sightings have."""
     return one.nis <= chi2_limit(probability, len(one.u))
+
+
+def _expected(ahead: Prediction, batch: Batch, rig: Rig, probability: float) -> bool:
+    """Say whether sightings fit the noise expected before: manoeuvres explain much of what one camera alone says."""
+    one = fit(ahead, batch, rig, adapt=False)
+    return one is not None and _fits(one, probability)
+
+
+def _without_liars(ahead: Prediction, whole: Fit, rig: Rig, probability: float) -> Fit | None:
+    """Return the best fit without a few sightings, or without a camera that shows another time; None when none fits."""
+    few = _without_few(ahead, whole, rig, probability)
+    if few is None or _splits_a_camera(whole.batch, few.batch):
+        return _without_a_camera(ahead, whole.batch, rig, probability)
+    return few
 
 
 def _without_few(ahead: Prediction, whole: Fit, rig: Rig, probability: float) -> Fit | None:

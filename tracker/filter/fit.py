@@ -9,11 +9,11 @@ import numpy as np
 from tracker.filter import manoeuvre
 from tracker.filter.batch import Batch
 from tracker.filter.bend import bend_noise
-from tracker.filter.correction import TILT_ROWS, likeliest, log_likelihoods, weighed
-from tracker.filter.manoeuvre import expected, judged
+from tracker.filter.correction import TILT_ROWS, likeliest, weighed
+from tracker.filter.manoeuvre import expected, judged, log_likelihoods
+from tracker.filter.matern import process_noise
 from tracker.filter.measure import Indices, camera_table
 from tracker.filter.predict import Prediction
-from tracker.filter.singer import process_noise
 from tracker.maths.compiled import compiled
 from tracker.rig import Rig
 from tracker.state import ATTITUDE
@@ -71,7 +71,7 @@ def fit(ahead: Prediction, batch: Batch, rig: Rig, *, adapt: bool = True) -> Fit
     # A tilt that lasts, as white noise of the same spectral density.
     tilt = 2.0 * process.tilt_rad**2 * process.tilt_s / max(ahead.dt, SHORTEST_S)
     levels, P, R, doubtful = _prepared(
-        ahead.state.levels, manoeuvre.variances(process), batch.y, batch.A, batch.B, batch.R, batch.path, batch.doubt,
+        ahead.state.levels, manoeuvre.strengths(process), batch.y, batch.A, batch.B, batch.R, batch.path, batch.doubt,
         ahead.P_coasted, ahead.dt, process.manoeuvre_s, tilt, adapt, ahead.turn_open,
     )  # fmt: skip
     agreed = None if doubtful and _clock_open(batch) else _fitted(ahead, batch, rig, levels, P, R)
@@ -99,15 +99,17 @@ def _prepared(
         before, levels = levels, judged(levels, log_likelihoods(y, A, B, of, expected(levels, of)))
         if unseen and expected(levels, of)[1] < expected(before, of)[1]:
             levels[1] = before[1]
-    translation, rotation = expected(levels, of)
+    means = expected(levels, of)
     R, noise, doubts = np.zeros((n + TILT_ROWS, n + TILT_ROWS)), 0.0, 0.0
     for i in range(n):
         for j in range(n):
-            R[i, j] = R_pixels[i, j] + translation * path[0, i, j] + rotation * path[1, i, j]
+            R[i, j] = R_pixels[i, j]
+            for k in range(len(path)):
+                R[i, j] += means[k] * path[k, i, j]
         noise, doubts = noise + R[i, i], doubts + doubt[i, i]
     for i in range(n, n + TILT_ROWS):
         R[i, i] = tilt
-    P = P_coasted + process_noise(len(P_coasted), dt, T, translation, rotation)
+    P = P_coasted + process_noise(len(P_coasted), dt, T, means)
     return levels, P, R, not doubts < LEAST_DOUBT * noise
 
 

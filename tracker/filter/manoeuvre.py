@@ -15,52 +15,117 @@ from functools import lru_cache
 
 import numpy as np
 
+from tracker.filter.matern import KINDS, MOTIONS
 from tracker.maths.compiled import compiled
 from tracker.state import Process
 from tracker.types import Array
 
-LEVELS = 6
+LEVELS = 9
 STEP = 3.0  # of sigma from one level to the next
+SUDDEN_S = 0.1  # within it the briskest manoeuvre begins; one a third as brisk takes three times as long
 CHANGE_S = 0.7  # a level is kept for about so long
-NEXT_SHARE = 0.5  # of the changes go to the level beside, the others to any
+RARER = 1.0 / 3.0  # a change is, for each level that it goes further
+
+
+def _changes() -> Array:
+    """Return the probability (LEVELS, LEVELS) that a change leads from a level to another."""
+    level = np.arange(LEVELS)
+    far = np.abs(level[:, None] - level)
+    weights = np.where(far > 0, RARER**far, 0.0)
+    return np.asarray(weights / weights.sum(axis=1, keepdims=True))
+
+
+CHANGES = _changes()
 
 
 def start_levels() -> Array:
-    """Return the probabilities (2, LEVELS) of a vehicle just found: nothing is known."""
-    return np.full((2, LEVELS), 1.0 / LEVELS)
+    """Return the probabilities (MOTIONS, LEVELS) of a vehicle just found: nothing is known."""
+    return np.full((MOTIONS, LEVELS), 1.0 / LEVELS)
 
 
 @lru_cache(maxsize=16)
-def variances(process: Process) -> Array:
-    """Return the levels' variances of acceleration (2, LEVELS): translation [m^2/s^4], rotation [rad^2/s^4]."""
-    shares = STEP ** (2.0 * np.arange(1 - LEVELS, 1))
-    tops = np.array([process.acceleration_m_s2, process.angular_acceleration_rad_s2]) ** 2
-    return np.asarray(tops[:, None] * shares)
+def strengths(process: Process) -> Array:
+    """Return the levels' strengths (KINDS * MOTIONS, LEVELS), as `process_noise` takes them.
+
+    Source: what changes by sigma within tau, as white noise, has density sigma^2 / tau.
+    """
+    shares = STEP ** np.arange(1.0 - LEVELS, 1.0)
+    sigmas = np.outer((process.acceleration_m_s2, process.angular_acceleration_rad_s2), shares)
+    return np.concatenate((sigmas**2, sigmas**2 * shares / SUDDEN_S))
 
 
 @compiled("f8[:, ::1](f8[:, ::1], f8)")
 def later(levels: Array, dt: float) -> Array:
-    """Return the probabilities (2, LEVELS) after dt without a sighting."""
-    leave, after, last = 1.0 - math.exp(-dt / CHANGE_S), np.empty(levels.shape), levels.shape[1] - 1
-    for k in range(2):
-        for i in range(last + 1):
-            beside = (levels[k, max(i - 1, 0)] + levels[k, min(i + 1, last)]) / 2.0
-            change = NEXT_SHARE * beside + (1.0 - NEXT_SHARE) / LEVELS
-            after[k, i] = (1.0 - leave) * levels[k, i] + leave * change
+    """Return the probabilities (MOTIONS, LEVELS) after dt without a sighting."""
+    leave = 1.0 - math.exp(-dt / CHANGE_S)
+    after = (1.0 - leave) * levels
+    for motion in range(MOTIONS):
+        for i in range(LEVELS):
+            for j in range(LEVELS):
+                after[motion, j] += leave * levels[motion, i] * CHANGES[i, j]
     return after
+
+
+@compiled("f8[:, :, ::1](f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])")
+def _tried(A: Array, B: Array, strengths: Array, means: Array) -> Array:
+    """Return S (n, n, MOTIONS * levels), lower half, under every level of one motion, then of the other."""
+    n, levels = len(A), strengths.shape[1]
+    S, tried = np.empty((n, n, MOTIONS * levels)), np.empty((len(B), MOTIONS * levels))
+    for k in range(len(B)):
+        tried[k] = means[k]
+        first = k % MOTIONS * levels
+        tried[k, first : first + levels] = strengths[k]
+    for i in range(n):
+        for j in range(i + 1):
+            S[i, j] = A[i, j]
+            for k in range(len(B)):
+                for t in range(MOTIONS * levels):
+                    S[i, j, t] += tried[k, t] * B[k, i, j]
+    return S
+
+
+@compiled("f8[:, ::1](f8[::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1])")
+def log_likelihoods(y: Array, A: Array, B: Array, strengths: Array, means: Array) -> Array:
+    """Return the log likelihoods (MOTIONS, levels) of innovations y (n,) under S = A + sum s_k B_k, up to a constant.
+
+    Args:
+        B: (s, n, n) by each strength of 1, s = KINDS * MOTIONS.
+        strengths: (s, levels) tried of one motion, while those of the other have their means (s,).
+    """
+    L = _tried(A, B, strengths, means)  # all go through Cholesky's factors side by side
+    n, tries = len(y), L.shape[2]
+    found, white = np.zeros(tries), np.empty((n, tries))
+    for i in range(n):
+        white[i] = y[i]
+        for j in range(i + 1):
+            for k in range(j):
+                for t in range(tries):
+                    L[i, j, t] -= L[i, k, t] * L[j, k, t]
+            if j < i:
+                for t in range(tries):
+                    L[i, j, t] /= L[j, j, t]
+                    white[i, t] -= L[i, j, t] * white[j, t]
+        for t in range(tries):
+            L[i, i, t] = math.sqrt(L[i, i, t])
+            white[i, t] /= L[i, i, t]
+            found[t] -= 0.5 * white[i, t] ** 2 + math.log(L[i, i, t])
+    return found.reshape(MOTIONS, strengths.shape[1])
 
 
 @compiled("f8[:, ::1](f8[:, ::1], f8[:, ::1])")
 def judged(levels: Array, log_likelihoods: Array) -> Array:
-    """Return the probabilities (2, LEVELS) after pixels of these log likelihoods (2, LEVELS) under each level."""
+    """Return the probabilities (MOTIONS, LEVELS) after pixels of these log likelihoods under each level."""
     after = np.empty(levels.shape)
-    for k in range(2):
-        after[k] = levels[k] * np.exp(log_likelihoods[k] - log_likelihoods[k].max())
-        after[k] /= after[k].sum()
+    for motion in range(MOTIONS):
+        after[motion] = levels[motion] * np.exp(log_likelihoods[motion] - log_likelihoods[motion].max())
+        after[motion] /= after[motion].sum()
     return after
 
 
-@compiled("UniTuple(f8, 2)(f8[:, ::1], f8[:, ::1])")
-def expected(levels: Array, of: Array) -> tuple[float, float]:
-    """Return the mean variances of translation and rotation."""
-    return (levels[0] * of[0]).sum(), (levels[1] * of[1]).sum()
+@compiled("f8[::1](f8[:, ::1], f8[:, ::1])")
+def expected(levels: Array, of: Array) -> Array:
+    """Return the mean strengths (KINDS * MOTIONS,)."""
+    means = np.empty(KINDS * MOTIONS)
+    for k in range(KINDS * MOTIONS):
+        means[k] = (levels[k % MOTIONS] * of[k]).sum()
+    return means

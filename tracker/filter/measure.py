@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.filter.singer import faded
+from tracker.filter.matern import faded
 from tracker.maths.compiled import compiled
 from tracker.maths.so3_compiled import turn_into
 from tracker.rig import Rig
@@ -109,26 +109,28 @@ def pixels(
         table, points_inB: as `camera_table` and `marker_points` give them.
     Returns:
         h (2n,) pixels, NaN behind a camera; H (2n, size) d pixel / d error.
-    Source: with tau = lag + offset, phi = w tau + alpha place(tau) and E = exp(phi), ball m stands at
-        p + v tau + a place + R E m. An error turns it by d(R exp(theta) E m) = -R [E m]x theta and
-        d(R exp(phi + d) m) = -R E [m]x J_r(phi) d (1). It moves with v + a speed, while phi grows by w + alpha speed.
+    Source: with tau = lag + offset, place and speed what `faded` leaves after tau of an acceleration (_a) and of a jerk
+        (_j), phi = w tau + alpha place_a + beta place_j and E = exp(phi), ball m stands at
+        p + v tau + a place_a + j place_j + R E m. An error turns it by d(R exp(theta) E m) = -R [E m]x theta and
+        d(R exp(phi + d) m) = -R E [m]x J_r(phi) d (1). It moves with v + a speed_a + j speed_j, and phi grows likewise.
     """
     n = len(cameras)
-    h, H = np.empty(2 * n), np.zeros((2 * n, 17 + len(table)))
+    h, H = np.empty(2 * n), np.zeros((2 * n, 23 + len(table)))
     R, RE, E, J_r = mean[3:12].copy().reshape(3, 3), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     J, by_theta, by_phi = np.empty((2, 3)), np.empty((2, 3)), np.empty((2, 3))
     ball_inW, arm, v, w = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     for s in range(n):
         c, m = cameras[s], points_inB[balls[s]]
-        tau = lags_s[s] + mean[24 + c]
-        place, speed, _ = faded(tau, T)
-        phi = tau * mean[15:18] + place * mean[21:24]
+        tau = lags_s[s] + mean[30 + c]
+        place_a, speed_a, _, _, place_j, speed_j, _, _ = faded(tau, T)
+        phi = tau * mean[15:18] + place_a * mean[21:24] + place_j * mean[27:30]
         turn_into(phi[0], phi[1], phi[2], E, J_r)
         for i in range(3):
             arm[i] = E[i, 0] * m[0] + E[i, 1] * m[1] + E[i, 2] * m[2]
-            v[i], w[i] = mean[12 + i] + speed * mean[18 + i], mean[15 + i] + speed * mean[21 + i]
+            v[i] = mean[12 + i] + speed_a * mean[18 + i] + speed_j * mean[24 + i]
+            w[i] = mean[15 + i] + speed_a * mean[21 + i] + speed_j * mean[27 + i]
         for i in range(3):
-            ball_inW[i] = mean[i] + tau * mean[12 + i] + place * mean[18 + i]
+            ball_inW[i] = mean[i] + tau * mean[12 + i] + place_a * mean[18 + i] + place_j * mean[24 + i]
             for j in range(3):
                 ball_inW[i] += R[i, j] * arm[j]
                 RE[i, j] = R[i, 0] * E[0, j] + R[i, 1] * E[1, j] + R[i, 2] * E[2, j]
@@ -141,7 +143,8 @@ def pixels(
                 turned = by_phi[k, 0] * J_r[0, i] + by_phi[k, 1] * J_r[1, i] + by_phi[k, 2] * J_r[2, i]  # (1)
                 row[i], row[3 + i] = J[k, i], by_theta[k, i]
                 row[6 + i], row[9 + i] = tau * J[k, i], tau * turned
-                row[12 + i], row[15 + i] = place * J[k, i], place * turned
+                row[12 + i], row[15 + i] = place_a * J[k, i], place_a * turned
+                row[18 + i], row[21 + i] = place_j * J[k, i], place_j * turned
                 if c > 0:  # J_r(phi) d phi / d tau is the body's rate then, up to the bracket of phi and its rate
-                    row[17 + c] += J[k, i] * v[i] + turned * w[i]
+                    row[23 + c] += J[k, i] * v[i] + turned * w[i]
     return h, H

@@ -66,30 +66,47 @@ def _turned_cross(R: Array, a: Array) -> Array:
     return found
 
 
+@compiled("void(f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[::1])")
+def _turn_slopes(J: Array, R: Array, w: Array, alpha: Array, m: Array) -> None:
+    """Write how acceleration and jerk of the point m go with rate and angular acceleration, see `moved_to`."""
+    speed, swing, e = _cross(w, m), _cross(alpha, m), np.zeros(3)
+    pull = swing + _cross(w, speed)
+    for j in range(3):
+        e[:] = 0.0
+        e[j] = 1.0
+        arm = _cross(e, m)
+        pull_by_w = _cross(e, speed) + _cross(w, arm)
+        jolt_by_w = _cross(alpha, arm) + _cross(e, swing + pull) + _cross(w, pull_by_w)
+        jolt_by_alpha = _cross(e, speed) + 2.0 * _cross(w, arm)
+        for i in range(3):
+            J[12 + i, 9 + j] = R[i, 0] * pull_by_w[0] + R[i, 1] * pull_by_w[1] + R[i, 2] * pull_by_w[2]
+            J[18 + i, 9 + j] = R[i, 0] * jolt_by_w[0] + R[i, 1] * jolt_by_w[1] + R[i, 2] * jolt_by_w[2]
+            J[18 + i, 15 + j] = R[i, 0] * jolt_by_alpha[0] + R[i, 1] * jolt_by_alpha[1] + R[i, 2] * jolt_by_alpha[2]
+
+
 @compiled("Tuple((f8[::1], f8[:, ::1]))(f8[::1], f8[::1], i8)")
 def moved_to(mean: Array, m: Array, size: int) -> tuple[Array, Array]:
     """Return the mean of the point that stands at m in the frame of `mean`, and d its error / d error (size, size).
 
-    Source: that point has place p + R m, speed v + R (w x m), acceleration a + R (alpha x m + w x (w x m)).
+    Source: that point has place p + R m and, since R x goes by R (dx / dt + w x x), speed v + R (w x m), acceleration
+        a + R (alpha x m + w x (w x m)) and jerk
+        j + R (beta x m + alpha x (w x m) + 2 w x (alpha x m) + w x (w x (w x m))).
     """
     after, J = mean.copy(), np.eye(size)
     R = mean[3:12].copy().reshape(3, 3)
-    w, alpha = mean[15:18].copy(), mean[21:24].copy()
-    speed = _cross(w, m)
-    pull = _cross(alpha, m) + _cross(w, speed)
-    by_arm, by_speed, by_pull = _turned_cross(R, m), _turned_cross(R, speed), _turned_cross(R, pull)
-    for i in range(3):
-        for j in range(3):
-            after[i] += R[i, j] * m[j]
-            after[12 + i] += R[i, j] * speed[j]
-            after[18 + i] += R[i, j] * pull[j]
-            J[i, 3 + j] = J[6 + i, 9 + j] = J[12 + i, 15 + j] = -by_arm[i, j]
-            J[6 + i, 3 + j], J[12 + i, 3 + j] = -by_speed[i, j], -by_pull[i, j]
-            J[12 + i, 9 + j] = -by_speed[i, j]
-    for j in range(3):  # w x (dw x m) = -[w]x [m]x dw
-        unit = np.zeros(3)
-        unit[j] = 1.0
-        column = _cross(w, _cross(unit, m))
+    w, alpha, beta = mean[15:18].copy(), mean[21:24].copy(), mean[27:30].copy()
+    speed, swing = _cross(w, m), _cross(alpha, m)
+    pull = swing + _cross(w, speed)
+    jolt = _cross(beta, m) + _cross(alpha, speed) + _cross(w, swing + pull)
+    by_m = _turned_cross(R, m)
+    arms = (m, speed, pull, jolt)
+    for k in range(4):
+        first = 6 + 6 * k if k > 0 else 0  # in `mean`; in the error it is 6 k
+        by_arm = _turned_cross(R, arms[k])
         for i in range(3):
-            J[12 + i, 9 + j] += R[i, 0] * column[0] + R[i, 1] * column[1] + R[i, 2] * column[2]
+            after[first + i] += R[i, 0] * arms[k][0] + R[i, 1] * arms[k][1] + R[i, 2] * arms[k][2]
+            for j in range(3):
+                J[6 * k + i, 3 + j] = -by_arm[i, j]
+                J[6 * k + i, 3 + 6 * k + j] = -by_m[i, j]
+    _turn_slopes(J, R, w, alpha, m)
     return after, J

@@ -8,9 +8,9 @@ import numpy as np
 
 from tracker.filter import manoeuvre
 from tracker.filter.manoeuvre import expected, later
+from tracker.filter.matern import carried, process_noise
 from tracker.filter.measure import marker_points
 from tracker.filter.pivot import best_known, moved_to
-from tracker.filter.singer import carried, process_noise
 from tracker.maths.compiled import compiled
 from tracker.rig import Rig
 from tracker.state import OFFSETS, Process, State
@@ -59,7 +59,7 @@ def predict(state: State, t_ns: int, process: Process) -> Prediction:
     if dt < 0.0:
         raise ValueError(f"cannot predict back by {-dt} s")
     walk = OFFSET_WALK**2 * dt if process.clock_offset_s > 0.0 else 0.0
-    of = manoeuvre.variances(process)
+    of = manoeuvre.strengths(process)
     mean, P_coasted, P, levels, pivot_inB = _ahead(
         state.mean, state.P, state.levels, of, dt, process.manoeuvre_s, walk
     )  # fmt: skip
@@ -99,7 +99,7 @@ def _ahead(
 ) -> tuple[Array, Array, Array, Array, Array]:
     """Return mean, coasted covariance F P F', that with the expected manoeuvre, and levels, after dt; and the pivot.
 
-    of: variances of the levels.  walk: variance that each clock offset gains [s^2].
+    of: strengths of the levels.  walk: variance that each clock offset gains [s^2].
     """
     size, pivot = len(P), best_known(mean, P)
     start, there = moved_to(mean, pivot, size)
@@ -109,8 +109,7 @@ def _ahead(
     for i in range(OFFSETS, size):
         coasted[i, i] += walk
     then = later(levels, dt)
-    translation, rotation = expected(then, of)
-    P_then = coasted + process_noise(size, dt, T, translation, rotation)
+    P_then = coasted + process_noise(size, dt, T, expected(then, of))
     return after, _conjugated(back, coasted), _conjugated(back, P_then), then, pivot
 
 

@@ -16,7 +16,7 @@ from tracker.types import Array
 RIG = ring_rig(2)
 FLYING = state(0, (0.2, -0.1, 0.1), (12.0, -8.0, 130.0))
 ONE_CAMERA = np.zeros(2, dtype=np.int64), np.array([0, 1]), np.zeros(2)
-SIZE = 19
+SIZE = 25
 
 
 def seen(mean: Array, points_inB: Array) -> tuple[Array, Array]:

@@ -22,10 +22,12 @@ from tests.tracker.rigs import (
     state,
 )
 from tracker.filter import ekf
+from tracker.filter.batch import make_batch
 from tracker.filter.ekf import Update
+from tracker.filter.manoeuvre import strengths
+from tracker.filter.matern import process_noise
 from tracker.filter.measure import predicted_pixels
 from tracker.filter.predict import Prediction, first_guess, predict
-from tracker.filter.singer import process_noise
 from tracker.rig import Rig
 from tracker.state import State
 from tracker.types import Array, BallSighting, Reason, Rejected, frozen_array
@@ -36,7 +38,8 @@ PERIOD_NS = 33_333_333
 OPEN = 1.0 - 1e-9  # a gate that lets every true sighting pass
 GATE = 0.999
 AT_FIRST_SIGHT = covariance(0.05, 0.3, 2.5, 1.6)
-NOISE = process_noise(19, PERIOD_NS * 1e-9, PROCESS.manoeuvre_s, 100.0, 1600.0) + 1e-18 * np.eye(19)
+BRISKEST = process_noise(25, PERIOD_NS * 1e-9, PROCESS.manoeuvre_s, strengths(PROCESS)[:, -1].copy())
+NOISE = BRISKEST + 1e-18 * np.eye(25)
 FLYING = state(0, (0.2, -0.1, 0.1), (12.0, -8.0, 130.0), (1.0, -0.5, 0.3), (0.4, -0.8, 1.5))
 
 
@@ -108,6 +111,19 @@ def test_a_second_of_one_camera_and_one_hidden_ball_costs_accuracy_and_not_the_t
         guess = updated(update(predict(guess, k * PERIOD_NS, PROCESS), seen, RIG, GATE)).state
     assert nees(at(truth, guess.t_ns), guess) < chi2.ppf(GATE, 12)
     assert np.linalg.norm(difference(at(truth, guess.t_ns), guess)[:3]) < 0.03
+
+
+def test_one_camera_does_not_carry_a_track_out_of_the_envelope_alone() -> None:
+    """A jump within one camera's gates and beyond the other's: it is no manoeuvre, and no camera's mistake."""
+    ahead = predict(replace(FLYING, P=covariance(1e-4, 1e-3, 0.01, 0.01)), PERIOD_NS, PROCESS)
+    across_inW, _, along_inW = RIG.cameras[0].R_CtoW.T
+    sigma_m = np.sqrt(along_inW @ (ahead.P_coasted + BRISKEST)[:3, :3] @ along_inW)
+    jump_inW = sigma_m * (3.0 * across_inW + 4.3 * along_inW)
+    jumped = replace(ahead.state, p_BinW=ahead.state.p_BinW + jump_inW)
+    seen = sightings(jumped, RIG, [(0, PERIOD_NS), (1, PERIOD_NS)], SIGMA_PX)
+    near = [distance2 < chi2.ppf(GATE, 2) for distance2 in make_batch(ahead, seen, RIG).distances2()]
+    assert near == [sighting.camera == 0 for sighting in seen]
+    assert isinstance(update(ahead, seen, RIG, GATE), Rejected)
 
 
 def lie(seen: tuple[BallSighting, ...], index: int, shift_px: tuple[float, float]) -> tuple[BallSighting, ...]:
@@ -227,7 +243,7 @@ def test_the_update_is_the_most_likely_state_between_prior_and_pixels(seed: int)
     """Against scipy's own least squares: rough pixels, a prior surer of some turns than of others, 30 deg off."""
     rng = np.random.default_rng(seed)
     sigmas = [0.03, 0.03, 0.03, 0.04, 0.15, 0.3, 0.3, 0.3, 0.3, 0.5, 0.5, 0.5]
-    P, sigma_px = np.diag(np.square([*sigmas, *[1e-6] * 7])), 8.0
+    P, sigma_px = np.diag(np.square([*sigmas, *[1e-6] * 13])), 8.0
     start = replace(perturbed(FLYING, 2.0 * drawn(rng, P)), P=P)
     seen = sightings(FLYING, RIG, [(0, 0), (1, 30_000_000)], sigma_px, rng)
     root = np.sqrt(np.diag(P))
@@ -243,7 +259,7 @@ def test_the_update_is_the_most_likely_state_between_prior_and_pixels(seed: int)
         pixels = [(s.uv_px - g.uv_px) / sigma_px for s, g in zip(seen, guess, strict=True)]
         return np.concatenate((scaled, *pixels))
 
-    likeliest = put_in(least_squares(misfit, np.zeros(19), xtol=1e-12).x * root)
+    likeliest = put_in(least_squares(misfit, np.zeros(25), xtol=1e-12).x * root)
     found = updated(update(start, seen, RIG, OPEN)).state
     off = difference(likeliest, found)
     assert np.sqrt(off @ np.linalg.solve(found.P[:12, :12], off)) < 0.005

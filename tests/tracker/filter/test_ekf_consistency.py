@@ -16,7 +16,7 @@ from tracker.filter.manoeuvre import start_levels
 from tracker.filter.noise import start_noise
 from tracker.filter.predict import first_guess, predict
 from tracker.sources.paths import PATHS, PathFunction
-from tracker.state import State, start_covariance
+from tracker.state import OFFSETS, State, start_covariance
 from tracker.types import Array, BallSighting, frozen_array
 
 RIG = ring_rig(2)
@@ -139,7 +139,7 @@ def test_an_unknown_clock_offset_is_found_to_half_a_millisecond() -> None:
     for seed, offset_s in enumerate((0.03, -0.03, 0.012, 0.0)):
         last = flown(PATHS["figure8"], seed, 30.0, offset_s=offset_s)[-1].state
         assert abs(last.offsets_s[1] - offset_s) < 0.0005
-        assert np.sqrt(last.P[18, 18]) < 0.0005
+        assert np.sqrt(last.P[OFFSETS, OFFSETS]) < 0.0005
 
 
 @pytest.mark.parametrize("name", ["hover", "square", "figure8"])
@@ -149,14 +149,14 @@ def test_an_unknown_clock_offset_errs_as_its_sigma_says(name: str) -> None:
     for seed in range(20):
         offset_s = float(np.random.default_rng(500 + seed).normal(scale=PROCESS.clock_offset_s))
         last = flown(PATHS[name], seed, 6.0, offset_s=offset_s)[-1].state
-        squares.append((last.offsets_s[1] - offset_s) ** 2 / last.P[18, 18])
+        squares.append((last.offsets_s[1] - offset_s) ** 2 / last.P[OFFSETS, OFFSETS])
     assert np.mean(squares) < chi2.ppf(0.975, 20) / 20
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_a_vehicle_that_stands_still_teaches_no_clock_offset(seed: int) -> None:
     last = flown(lambda _t_s: PATHS["hover"](0.0), seed, 8.0, offset_s=0.01)[-1].state
-    assert np.sqrt(last.P[18, 18]) > 0.99 * PROCESS.clock_offset_s
+    assert np.sqrt(last.P[OFFSETS, OFFSETS]) > 0.99 * PROCESS.clock_offset_s
     assert abs(last.offsets_s[1]) < 0.1 * PROCESS.clock_offset_s
 
 

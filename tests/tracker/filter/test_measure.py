@@ -43,7 +43,7 @@ def test_the_slope_is_that_of_finite_differences(
 def test_at_the_states_own_time_velocity_and_rate_do_not_show() -> None:
     now = state(5, v_BinW=(1.0, 2.0, 3.0), w_BinB=(3.0, 2.0, 1.0))
     _, H = predicted_pixels(now, RIG, 0, 5)
-    assert not H[:, :, 6:18].any()
+    assert not H[:, :, 6:24].any()
     assert H[:, :, :6].any(axis=(0, 1)).all()
 
 
@@ -51,7 +51,7 @@ def test_a_ball_behind_the_camera_is_expected_nowhere() -> None:
     camera = RIG.cameras[0]
     uv_px, H = predicted_pixels(state(0, camera.p_CinW - camera.R_CtoW[:, 2]), RIG, 0, 0)
     assert uv_px.shape == (3, 2)
-    assert H.shape == (3, 2, 19)
+    assert H.shape == (3, 2, 25)
     assert np.isnan(uv_px).all()
 
 

@@ -27,7 +27,7 @@ VECTOR = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1
 
 def known(now: State) -> State:
     """Return a state that is as sure of itself as a track is, errors correlated."""
-    root = 1e-2 * np.random.default_rng(1).normal(size=(19, 19))
+    root = 1e-2 * np.random.default_rng(1).normal(size=(25, 25))
     return replace(now, P=root @ root.T, offsets_s=np.zeros(2))
 
 
@@ -69,7 +69,7 @@ def test_a_ball_behind_the_camera_is_expected_nowhere() -> None:
 
 def test_a_streak_not_known_of_is_speeds_sigma_times_exposure_times_focal_length_over_distance() -> None:
     sigma_m_s = 0.3
-    P = np.zeros((19, 19))
+    P = np.zeros((25, 25))
     P[6:9, 6:9] = sigma_m_s**2 * np.eye(3)
     now, camera = replace(state(), P=P), RIG.cameras[1]
     one_open = unknown_streak_px(now, RIG, (0.0, 0.004))

@@ -1,0 +1,54 @@
+"""How brisk the manoeuvre is: what time and pixels do to the levels."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.stats import multivariate_normal
+
+from tests.tracker.rigs import PROCESS, ring_rig, sightings, state
+from tracker.filter.batch import make_batch
+from tracker.filter.manoeuvre import LEVELS, RARER, expected, later, log_likelihoods, start_levels, strengths
+from tracker.filter.matern import MOTIONS, process_noise
+from tracker.filter.measure import predicted_pixels
+from tracker.filter.predict import predict
+
+OF = strengths(PROCESS)
+
+
+@given(st.integers(0, LEVELS - 1), st.floats(0.001, 10.0))
+def test_a_change_of_level_is_rarer_the_further_it_goes(level: int, dt: float) -> None:
+    levels = np.zeros((MOTIONS, LEVELS))
+    levels[:, level] = 1.0
+    after = later(levels, dt)
+    assert np.allclose(after.sum(axis=1), 1.0)
+    for way in (after[:, level + 1 :], after[:, :level][:, ::-1]):
+        assert np.allclose(way[:, 1:], RARER * way[:, :-1])
+
+
+def test_the_likelihood_of_a_level_is_that_of_its_gaussian() -> None:
+    """By scipy, with one motion at each level and the other at its mean."""
+    rng = np.random.default_rng(1)
+    A, *B = (root @ root.T for root in rng.normal(size=(5, 6, 6)))
+    y, means = rng.normal(size=6), expected(start_levels(), OF)
+    found = log_likelihoods(y, A, np.array(B), OF, means)
+    for motion in range(MOTIONS):
+        tried = np.tile(means, (LEVELS, 1))
+        tried[:, motion::MOTIONS] = OF[motion::MOTIONS].T
+        sums = [A + np.tensordot(strength, B, 1) for strength in tried]
+        true = np.array([multivariate_normal.logpdf(y, cov=S) for S in sums])
+        assert np.allclose(found[motion] - found[motion, 0], true - true[0])
+
+
+@pytest.mark.parametrize("strength", range(4))
+def test_each_strength_adds_its_process_noise_to_the_innovation(strength: int) -> None:
+    rig, t_ns = ring_rig(2), 33_000_000
+    now = state(0, (0.2, -0.1, 0.1), (12.0, -8.0, 130.0), (1.0, -0.5, 0.3), (0.4, -0.8, 1.5))
+    ahead = predict(now, t_ns, PROCESS)
+    seen = sightings(now, rig, [(0, t_ns), (1, t_ns + 5_000_000)], 0.1)
+    batch = make_batch(ahead, seen, rig)
+    H = np.concatenate([predicted_pixels(ahead.state, rig, s.camera, s.t_ns)[1][s.ball] for s in seen])
+    Q = process_noise(25, ahead.dt, PROCESS.manoeuvre_s, np.eye(4)[strength])
+    assert np.allclose(batch.B[strength] - batch.path[strength], H @ Q @ H.T)
