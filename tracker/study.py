@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from tracker.filter.ekf import Update, update
 from tracker.filter.predict import Prediction
-from tracker.filter.witness import doubted_alone, too_lonely
+from tracker.filter.witness import Quarrel, doubted_alone, too_lonely
 from tracker.harvest import Harvest
 from tracker.image.eyes import Eyes
 from tracker.image.look import Look
@@ -29,6 +29,7 @@ class Study:
         self._rig = rig
         self._tuning = tuning
         self._eyes = eyes
+        self._quarrel = Quarrel()
         self._stopwatch = stopwatch
 
     def stand(self, rig: Rig) -> None:
@@ -90,13 +91,17 @@ class Study:
         started_ns = self._stopwatch()
         look = self._eyes.look(frames, expected)
         looked_ns = self._stopwatch()
-        found = self.update(ahead, doubted_alone([one.sighting for one in look.fitted], last))
+        sightings = doubted_alone([one.sighting for one in look.fitted], last)
+        found = self.update(ahead, sightings)
         harvest.find_ns += looked_ns - started_ns
         harvest.filter_ns += self._stopwatch() - looked_ns
         looking = [frame.camera for frame in frames]
         if isinstance(found, Update) and too_lonely(found.used, looking, len(self._rig.marker)):
             detail = f"camera {found.used[0].camera} shows {len(found.used)} of the balls, and no other one any"
             found = Rejected(Reason.ALONE, detail, ahead.state.t_ns)
+        if isinstance(found, Update) and self._quarrel.accused(sightings, found.used):
+            detail = "two cameras contradict each other, and neither is believed yet"
+            found = Rejected(Reason.FRAME_GATE, detail, ahead.state.t_ns)
         if isinstance(found, Update) and last is None and not self._all_seen_twice(found):
             found = Rejected(Reason.GEOMETRY, "not every ball fits in two cameras", ahead.state.t_ns)
         return found, look

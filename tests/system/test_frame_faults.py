@@ -102,7 +102,7 @@ CASES = [
     ),
     Case("a camera that damages all for a second", during(Trouble(broken_from=0.45), [1])),
     Case("frames shown twice", spoil=repeated, ends=False),
-    Case("torn frames", spoil=torn, least=FRAMES - 2, ends=False),
+    Case("torn frames", spoil=torn, least=FRAMES - 3, ends=False),
     Case("frames half noise", spoil=half_noise, ends=False),
     Case("frames one pair late", spoil=late(1), least=FRAMES - 4),
     Case("frames three pairs late", spoil=late(3), least=FRAMES - 4),

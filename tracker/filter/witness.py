@@ -3,6 +3,9 @@
 While a ball is hidden the turn about the other two is open, and whatever has its colour near where it may be fits. What
 one camera sees there and another, which sees the other balls, does not, may be half a ball or two things in one: it is
 taken with the doubt of such a spot's middle.
+
+Of two cameras that contradict each other the track tells which shows what was to be expected. A torn frame that shows
+the past does, an honest one that shows a sudden turn does not.
 """
 
 from __future__ import annotations
@@ -43,6 +46,33 @@ def doubted_alone(sightings: Sequence[BallSighting], last: State | None) -> tupl
         return tuple(sightings)
     seen = {camera: {s.ball for s in sightings if s.camera == camera} for camera in cameras}
     return tuple(_doubted(one) if _denied(one.ball, seen) else one for one in sightings)
+
+
+class Quarrel:
+    """Two cameras that contradict each other: neither is believed the first time.
+
+    One that lies once (a torn frame, a ghost) costs a round then, and no wrong pose. One that goes on is left out.
+    """
+
+    def __init__(self) -> None:
+        self._accused: int | None = None
+        self._since_ns = 0
+
+    def accused(self, seen: Sequence[BallSighting], used: Sequence[BallSighting]) -> tuple[BallSighting, ...]:
+        """Return the sightings of the camera that a single other one left out, for the first time; none otherwise.
+
+        seen: sightings of one instant.  used: those of them that the update believes.
+        """
+        believed = {sighting.camera for sighting in used}
+        against = tuple(sighting for sighting in seen if sighting.camera not in believed)
+        if len(believed) > 1:
+            self._accused = None
+        if len(believed) > 1 or len(against) < WITNESSES:
+            return ()
+        camera, _, t_ns, *_ = against[0]
+        if self._accused != camera:
+            self._accused, self._since_ns = camera, t_ns
+        return against if t_ns <= self._since_ns else ()
 
 
 def _denied(ball: int, seen: Mapping[int, Collection[int]]) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.tracker.rigs import TUNING
-from tracker.filter.witness import DOUBT_PX, OPEN_RAD, doubted_alone, too_lonely
+from tracker.filter.witness import DOUBT_PX, OPEN_RAD, Quarrel, doubted_alone, too_lonely
 from tracker.state import ATTITUDE, State, start_covariance
 from tracker.types import BallSighting, frozen_array
 
@@ -20,11 +20,12 @@ def state(attitude_rad: float) -> State:
     return State(0, np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3), P)
 
 
-def seen(*pairs: tuple[int, int]) -> list[BallSighting]:
+def seen(*pairs: tuple[int, int], t_ns: int = 0) -> list[BallSighting]:
     cov_px = frozen_array(SIGMA_PX**2 * np.eye(2))
-    return [BallSighting(camera, ball, 0, frozen_array((320.0, 240.0)), cov_px) for camera, ball in pairs]
+    return [BallSighting(camera, ball, t_ns, frozen_array((320.0, 240.0)), cov_px) for camera, ball in pairs]
 
 
+ALL_TWICE = ((0, 0), (0, 1), (0, 2), (1, 0), (1, 1), (1, 2))
 WITH_ONE_ALONE = seen((0, 0), (1, 0), (0, 1), (1, 1), (1, 2))
 
 
@@ -71,3 +72,26 @@ def test_some_balls_in_one_camera_are_no_pose_while_another_sees_none(
     used: list[BallSighting], looking: tuple[int, ...], lonely: bool
 ) -> None:
     assert too_lonely(used, looking, 3) is lonely
+
+
+def test_of_two_cameras_that_contradict_each_other_none_is_believed_the_first_time() -> None:
+    quarrel = Quarrel()
+    first, second = (seen(*ALL_TWICE, t_ns=t_ns) for t_ns in (0, 66_000_000))
+    assert quarrel.accused(first, first[:3]) == tuple(first[3:])
+    assert quarrel.accused(first, first[:3]) == tuple(first[3:])  # the same images looked at again
+    assert quarrel.accused(second, second[:3]) == ()
+
+
+def test_cameras_that_agree_again_or_change_sides_begin_another_quarrel() -> None:
+    quarrel = Quarrel()
+    first, second, third, fourth = (seen(*ALL_TWICE, t_ns=k * 66_000_000) for k in range(4))
+    assert quarrel.accused(first, first[:3]) != ()
+    assert quarrel.accused(second, second) == ()
+    assert quarrel.accused(third, third[:3]) != ()
+    assert quarrel.accused(fourth, fourth[3:]) == tuple(fourth[:3])
+
+
+def test_one_ball_left_out_and_a_camera_that_two_others_leave_out_are_no_quarrel() -> None:
+    one_ball, outvoted = seen((0, 0), (0, 1), (0, 2), (1, 2)), seen(*ALL_TWICE, (2, 0), (2, 1))
+    assert Quarrel().accused(one_ball, one_ball[:3]) == ()
+    assert Quarrel().accused(outvoted, outvoted[:6]) == ()
