@@ -82,6 +82,7 @@ class Study:
             fitted = [one for one in fitted if (one.sighting.camera, one.sighting.ball) in used]
             harvest.refused += [one for one in seen if (one.camera, one.ball) not in used]
         self._eyes.learn(fitted, blindly=blindly)
+        self._eyes.look_behind(frames, found.state)
         return found
 
     def _glance(

@@ -54,7 +54,7 @@ def predicted_pixels(state: State, rig: Rig, camera: int, t_ns: int) -> tuple[Ar
 
 
 @compiled("UniTuple(f8, 2)(f8[::1], f8[::1], f8[:, ::1])")
-def _project(ball_inW: Array, camera: Array, J: Array) -> tuple[float, float]:
+def project(ball_inW: Array, camera: Array, J: Array) -> tuple[float, float]:
     """Return the pixel of a point (3,), NaN behind the camera, and write d pixel / d point (2, 3) into J [px/m].
 
     Source: OpenCV's pinhole model with k1 k2 p1 p2 k3 k4 k5 k6, and its derivative by the chain rule.
@@ -134,7 +134,7 @@ def pixels(
             for j in range(3):
                 ball_inW[i] += R[i, j] * arm[j]
                 RE[i, j] = R[i, 0] * E[0, j] + R[i, 1] * E[1, j] + R[i, 2] * E[2, j]
-        h[2 * s], h[2 * s + 1] = _project(ball_inW, table[c], J)
+        h[2 * s], h[2 * s + 1] = project(ball_inW, table[c], J)
         _turning(J, R, arm, by_theta)
         _turning(J, RE, m, by_phi)
         for k in range(2):

@@ -64,7 +64,7 @@ class Appearance:
             return self
         extent = extent_of(ball)
         centre = float(found.uv_px[0]) - extent.u, float(found.uv_px[1]) - extent.v
-        sample = sample_of(cut(image, extent, ball.response), ball, centre)
+        sample = sample_of(cut(image, extent, ball), ball, centre)
         response = sharper(sample, max(BLUR_STEP_PX, FIRST_STEP_PX / (1.0 + self.light.count / 3.0)))
         detail = response.detail + DETAIL_SHARE * (detail_of(image, extent) - response.detail)
         response = replace(response, detail=detail)

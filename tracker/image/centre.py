@@ -14,9 +14,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tracker.image.at_centre import squares_at
 from tracker.image.evidence import LEAST_EVIDENCE
 from tracker.image.holder import without_holder
-from tracker.image.newton import FIT_SIZE, gauss_newton, squares_at
+from tracker.image.newton import FIT_SIZE, gauss_newton
 from tracker.image.patch import Expected, Patch, cut, extent_of, fits_in
 from tracker.image.reading import LUMA_VAR
 from tracker.image.template import Template, template_for, variance_of
@@ -68,7 +69,7 @@ def fit_centre(image: Image, ball: Expected, held_px: tuple[float, float] | None
     extent = extent_of(ball)
     if not fits_in(image, extent):
         return Reason.AT_BORDER
-    patch, fit = cut(image, extent, ball.response), np.empty(FIT_SIZE)
+    patch, fit = cut(image, extent, ball), np.empty(FIT_SIZE)
     if held_px is not None:
         patch = without_holder(patch, extent, ball, held_px)
     luma, chroma = templates_of(ball)

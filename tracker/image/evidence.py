@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracker.image.patch import LUMA, PLANE, TRUST, X, Y
+from tracker.image.patch import LUMA, PLANE, TRUST, X, Y, channels_of
 from tracker.maths.compiled import compiled
 from tracker.maths.solve import dot, eliminate
 from tracker.types import Array
@@ -20,15 +20,16 @@ LEAST_EVIDENCE = 60.0
 
 @compiled("f8(f8[:, ::1], f8[::1], f8[::1])")
 def explained(pixels: Array, tukey: Array, squares: Array) -> float:
-    """Return by how much the squares left in brightness or colour (n,) are fewer than a plane without a ball leaves."""
-    channels, n = len(pixels) - LUMA, pixels.shape[1]
+    """Return by how much the squares left in brightness or colour (n,) are fewer than without a ball."""
+    channels, n = channels_of(pixels), pixels.shape[1]
     rows, products = np.empty((PLANE + channels, n)), np.empty((PLANE + channels, PLANE + channels))
     kept = 0.0
     for i in range(n):
         weight = tukey[i] * pixels[TRUST, i]
         rows[0, i], rows[1, i], rows[2, i] = weight, weight * pixels[X, i], weight * pixels[Y, i]
         for channel in range(channels):
-            rows[PLANE + channel, i] = weight * pixels[LUMA + channel, i]
+            bare = pixels[LUMA + channel, i] - pixels[LUMA + channels + channel, i]
+            rows[PLANE + channel, i] = weight * bare
         kept += tukey[i] ** 2 * squares[i]
     for j in range(len(rows)):
         for k in range(j + 1):

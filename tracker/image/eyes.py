@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -9,11 +10,12 @@ import numpy as np
 
 from tracker.image.album import Album
 from tracker.image.appearance import MISFIT_MAX, Appearance
+from tracker.image.behind import Behind
 from tracker.image.look import Fitted, Look, gaze_of, look_near
 from tracker.image.rivals import first_rivals
 from tracker.image.sight import MISFIT
 from tracker.image.tint import Bgr, Gains, Tint, core_colour
-from tracker.image.view import RADIUS, unknown_streak_px
+from tracker.image.view import RADIUS, unknown_streak_px, whereabouts
 from tracker.rig import Rig
 from tracker.state import State
 from tracker.types import Frame
@@ -36,8 +38,12 @@ class Eyes:
         self._rig = rig
         self._rivals = [first_rivals() for _ in rig.cameras]
         self._albums = [Album(camera) for camera in rig.cameras]
+        self._behind = [Behind(camera) for camera in rig.cameras]
         self._tints = [Tint() for _ in rig.cameras]
-        self._gazes = [gaze_of(rig, Appearance(), album) for album in self._albums]
+        self._gazes = [
+            gaze_of(rig, Appearance(), album, room=behind.room)
+            for album, behind in zip(self._albums, self._behind, strict=True)
+        ]
         self._turn = 0
         self._taught_blindly = False
         self._sum_up()
@@ -50,12 +56,16 @@ class Eyes:
                 self._gazes[index] = self._gazes[index].at_such(appearance)
         self._exposures_s = tuple([appearance.response.exposure_s for appearance in appearances])
         self.doubts_px = np.array([rivals.doubt_px for rivals in self._rivals])
-        self._gamma_known = all(rivals.settled for rivals in self._rivals)
-        enough = all(rivals.count >= LEARN_ALL for rivals in self._rivals)
+        self._gamma_known = all(rivals.settled or rivals.by_room for rivals in self._rivals)  # if not for the last time
+        enough = all(rivals.count >= LEARN_ALL or rivals.by_room for rivals in self._rivals)
         self._settled = self._gamma_known and enough  # how balls look is known, so that little is left to learn
+        self._every = LEARN_EVERY if all(rivals.settled for rivals in self._rivals) else 1
 
     def stand(self, rig: Rig) -> None:
         """Take the cameras to stand elsewhere."""
+        for before, now, behind in zip(self._rig.cameras, rig.cameras, self._behind, strict=True):
+            if now is not before:
+                behind.forget()
         self._rig = rig
 
     @property
@@ -86,7 +96,7 @@ class Eyes:
         """Take the light in one camera to be so; the colours looked for change in few, large steps."""
         self._tints[index], gaze = tint, self._gazes[index]
         if tint.gains.undoing != gaze.undoing:
-            self._gazes[index] = gaze_of(self._rig, gaze.appearance, gaze.album, tint.gains)
+            self._gazes[index] = gaze_of(self._rig, gaze.appearance, gaze.album, tint.gains, gaze.room)
 
     def look(self, frames: Sequence[Frame], state: State) -> Look:
         """Find each ball in each image where a state expects it."""
@@ -120,14 +130,25 @@ class Eyes:
                 self._sum_up()
         self._taught_blindly |= blindly and not self._gamma_known
         if self._settled:
-            if self._turn % LEARN_EVERY:
+            if self._turn % self._every:
                 return
-            fitted = [fitted[self._turn // LEARN_EVERY % len(fitted)]]
+            fitted = [fitted[self._turn // self._every % len(fitted)]]
         for one in fitted:
             index = one.frame.camera
             camera, image = self._rig.cameras[index], one.frame.image
-            self._rivals[index] = self._rivals[index].learned(image, camera, one.expected(camera), one.centre)
+            expected = one.expected(camera, self._behind[index].room)
+            self._rivals[index] = self._rivals[index].learned(image, camera, expected, one.centre)
         self._sum_up()
+
+    def look_behind(self, frames: Sequence[Frame], state: State) -> None:
+        """Learn the room where the vehicle is not, by frames of about a state's time; once it is known, by some."""
+        for frame in frames:
+            behind = self._behind[frame.camera]
+            if not behind.eager and (self._turn + frame.camera) % LEARN_EVERY:
+                continue
+            u, v, clear_px = whereabouts(state, self._rig, frame.camera)
+            if math.isfinite(u) and math.isfinite(v):
+                behind.learn(frame, (u, v), clear_px)
 
     def _follow_the_light(self, fitted: Sequence[Fitted]) -> None:
         """Learn the light from the balls' colours: of each camera at first, then of those that see now in turn."""

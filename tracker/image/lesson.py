@@ -9,9 +9,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.image.at_centre import slopes_at, squares_at
 from tracker.image.centre import numbers_of, templates_of
-from tracker.image.newton import slopes_at, squares_at
-from tracker.image.patch import LUMA, TRUST, Expected, Patch, Response, X, Y
+from tracker.image.patch import TRUST, Expected, Patch, Response, X, Y, without_room
 from tracker.image.reading import CHROMA_VAR, LUMA_VAR, STREAK_U, STREAK_V, read
 from tracker.image.robust import without_strangers
 from tracker.image.template import COARSE, GLOSS, TERMS, Template, Vector, draw, every_term, steps_of
@@ -120,7 +120,8 @@ def _without_others(pixels: Array, terms: Array, slopes: Array, products: Array)
         bare = 1.0 - terms[0, i]
         rows[0, i], rows[1, i], rows[2, i] = bare, bare * pixels[X, i], bare * pixels[Y, i]
     rows[PLANE], rows[PLANE + 1], rows[PLANE + 2] = slopes[0], slopes[1], terms[GLOSS]
-    rows[OTHERS:-1], rows[-1] = terms[:GLOSS], pixels[LUMA]
+    rows[OTHERS:-1] = terms[:GLOSS]
+    without_room(pixels, rows[0], rows[-1:])
     for j in range(len(rows)):
         for i in range(n):
             weighted[i] = pixels[TRUST, i] ** 2 * rows[j, i]

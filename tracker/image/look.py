@@ -12,6 +12,7 @@ import numpy as np
 from tracker.camera import Camera
 from tracker.image.album import Album
 from tracker.image.appearance import Appearance
+from tracker.image.behind import NO_ROOM, Room
 from tracker.image.centre import Centre
 from tracker.image.colour_table import ColourTable, colours_of_each
 from tracker.image.detect import Blob, find_blobs
@@ -41,12 +42,12 @@ class Fitted(NamedTuple):  # as `BallSighting`
     appearance: Appearance
     drawn: tuple[Template, Template]
 
-    def expected(self, camera: Camera) -> Expected:
+    def expected(self, camera: Camera, room: Room = NO_ROOM) -> Expected:
         """Return what was expected of the ball, from its coloured spot's middle. camera: the frame's."""
         view, (u, v) = self.view, self.fit[SPOT].tolist()
         ray, speed_px_s = (view[RAY_X], view[RAY_Y]), (view[SPEED_U], view[SPEED_V])
         shades = self.appearance.shades(camera, *ray)
-        return Expected((u, v), view[RADIUS], speed_px_s, shades, self.appearance.response, self.drawn, ray)
+        return Expected((u, v), view[RADIUS], speed_px_s, shades, self.appearance.response, self.drawn, ray, room)
 
     @property
     def streak_px(self) -> float:
@@ -83,7 +84,7 @@ class Gaze:
     """What one camera looks for: balls as they look to it now.
 
     known, colours: of the camera and of each ball, as compiled code takes them.  album: their templates.
-    undoing: the colour of the light that is undone, see `Gains.undoing`.
+    undoing: the colour of the light that is undone, see `Gains.undoing`.  room: what is known to stand behind.
     """
 
     appearance: Appearance
@@ -91,16 +92,18 @@ class Gaze:
     colours: tuple[ColourTable, ...]
     album: Album
     undoing: tuple[int, int]
+    room: Room = NO_ROOM
 
     def at_such(self, appearance: Appearance) -> Gaze:
         """Return it for balls that look so."""
-        return Gaze(appearance, known_of(appearance.response), self.colours, self.album, self.undoing)
+        return Gaze(appearance, known_of(appearance.response), self.colours, self.album, self.undoing, self.room)
 
 
-def gaze_of(rig: Rig, appearance: Appearance, album: Album, gains: Gains = NEUTRAL) -> Gaze:
+def gaze_of(rig: Rig, appearance: Appearance, album: Album, gains: Gains = NEUTRAL, room: Room = NO_ROOM) -> Gaze:
     """Return what a camera looks for to which balls look so, in a light of this colour."""
     undoing = gains.undoing
-    return Gaze(appearance, known_of(appearance.response), colours_of_each(rig.marker.balls, undoing), album, undoing)
+    colours = colours_of_each(rig.marker.balls, undoing)
+    return Gaze(appearance, known_of(appearance.response), colours, album, undoing, room)
 
 
 def look_near(frames: Sequence[Frame], rig: Rig, state: State, gazes: Sequence[Gaze]) -> Look:
@@ -131,7 +134,7 @@ def _find_balls(frame: Frame, rig: Rig, state: State, gaze: Gaze, look: Look) ->
             look.rejections.append(Rejected(Reason.BEHIND, f"{_name(rig, b)} is not before the camera", t_ns, camera))
             continue
         drawn = serve(b, view, appearance)
-        failed = find_ball(image, colours[b], rows[b], known, drawn, fits[b])
+        failed = find_ball(image, gaze.room, colours[b], rows[b], known, drawn, fits[b])
         if failed is None:
             row_ns = t_ns + round(eye.delay_ns(fits[b, UV][1])) if eye.readout_ns else t_ns
             sighting = BallSighting(camera, b, row_ns, uvs_px[b], covs_px2[b])

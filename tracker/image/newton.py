@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from tracker.image.doubt import NORMAL, OCTANTS, add_octants, disagreement, doubted_covariance
 from tracker.image.evidence import explained
-from tracker.image.patch import LUMA, PLANE, TRUST, X, Y
+from tracker.image.patch import LUMA, PLANE, TRUST, X, Y, channels_of, without_room
 from tracker.image.reading import CHROMA_VAR, LUMA_VAR, read
 from tracker.maths.compiled import compiled
 from tracker.maths.solve import TINY, cholesky, dot, lower, solve
@@ -52,11 +52,12 @@ def draw_at(
 
 
 @compiled("void(f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
-def fit_linear(pixels: Array, model: Array, weight: Array, weighted: Array, factor: Array, coefficients: Array) -> None:
+def fit_linear(seen: Array, model: Array, weight: Array, weighted: Array, factor: Array, coefficients: Array) -> None:
     """Solve for the linear coefficients of each channel (channels, m).
 
     Args:
-        model (m, n).  weight (n,): of each pixel.  weighted (m, n): the model with them, filled in.
+        seen (channels, n): see `without_room`.  model (m, n).
+        weight (n,): of each pixel.  weighted (m, n): the model with them, filled in.
         factor (m, m): Cholesky's, filled in.
     """
     for j in range(len(model)):
@@ -66,7 +67,7 @@ def fit_linear(pixels: Array, model: Array, weight: Array, weighted: Array, fact
             factor[j, k] = dot(weighted[j], model[k])
         factor[j, j] *= RIDGE
         for channel in range(len(coefficients)):
-            coefficients[channel, j] = dot(weighted[j], pixels[LUMA + channel])
+            coefficients[channel, j] = dot(weighted[j], seen[channel])
     cholesky(factor)
     for channel in range(len(coefficients)):
         solve(factor, coefficients[channel])
@@ -82,41 +83,42 @@ def residual(model: Array, c: Array, seen: Array, rest: Array) -> None:
             rest[i] -= c[j] * model[j, i]
 
 
-@compiled("void(f8[:, ::1], f8[:, ::1], f8[::1], f8[::1])")
-def slope_of(pixels: Array, by: Array, c: Array, slope: Array) -> None:
-    """Fill in the slope (n,) of the model with coefficients c (m,), from the shapes' slopes (p, n).
+@compiled("void(f8[:, ::1], i8, f8[:, ::1], f8[::1], f8[::1])")
+def slope_of(pixels: Array, channel: int, by: Array, c: Array, slope: Array) -> None:
+    """Fill in the slope (n,) of one channel's model with coefficients c (m,), from the shapes' slopes (p, n).
 
-    The background's rows are (1 - coverage) (1, x, y); their slopes are minus the coverage's times (1, x, y).
+    The background's rows are (1 - coverage) (1, x, y), as the known room's is; their slopes are minus the coverage's.
     """
-    p = len(by)
+    p, room = len(by), pixels[LUMA + channels_of(pixels) + channel]
     for i in range(len(slope)):
-        slope[i] = (c[0] - c[p] - c[p + 1] * pixels[X, i] - c[p + 2] * pixels[Y, i]) * by[0, i]
+        slope[i] = (c[0] - c[p] - c[p + 1] * pixels[X, i] - c[p + 2] * pixels[Y, i] - room[i]) * by[0, i]
     for j in range(1, p):
         for i in range(len(slope)):
             slope[i] += c[j] * by[j, i]
 
 
 @compiled(
-    "void(f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], i8, f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1],"
+    "void(f8[:, ::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], i8, f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1],"
     "f8[::1], f8[::1])"
 )
 def _add_channel(
-    pixels: Array, drawn: Array, weight: Array, weighted: Array, channel: int, factor: Array, c: Array, rows: Array,
-    T: Array, squares: Array, normal: Array,
+    pixels: Array, seen: Array, drawn: Array, weight: Array, weighted: Array, channel: int, factor: Array, c: Array,
+    rows: Array, T: Array, squares: Array, normal: Array,
 ) -> None:  # fmt: skip
     """Add what one channel says of the centre.
 
     Args:
-        drawn: by `draw_at`.  weighted, factor, c (m,): from `fit_linear`.
+        seen (n,): in this channel, without the known room.  drawn: by `draw_at`.
+        weighted, factor, c (m,): from `fit_linear`.
         rows (3, n), T (2, m): overwritten.
         squares (n,): misfit of each pixel, added to.
         normal (5,): information uu, uv, vv and gradient u, v of the centre, added to.
     """
     m, rest, slope_u, slope_v = len(c), rows[0], rows[1], rows[2]
     p = m - PLANE
-    residual(drawn[:m], c, pixels[LUMA + channel], rest)
-    slope_of(pixels, drawn[m : m + p], c, slope_u)
-    slope_of(pixels, drawn[m + p : m + 2 * p], c, slope_v)
+    residual(drawn[:m], c, seen, rest)
+    slope_of(pixels, channel, drawn[m : m + p], c, slope_u)
+    slope_of(pixels, channel, drawn[m + p : m + 2 * p], c, slope_v)
     uu = uv = vv = ur = vr = 0.0
     for i in range(len(weight)):
         u, v = weight[i] * slope_u[i], weight[i] * slope_v[i]
@@ -145,19 +147,20 @@ def _linearise(pixels: Array, drawn: Array, tukey: Array, work: Array, squares: 
     work (m + 1 + 3 channels, n): overwritten, its last rows by what each channel leaves and its slopes by u and by v.
     Fills in squares (n,) and normal (5,) as `_add_channel` does.
     """
-    channels = len(pixels) - LUMA
+    channels = channels_of(pixels)
     m = len(work) - 1 - 3 * channels
-    weight = work[m]
+    weight, seen = work[m], np.empty((channels, pixels.shape[1]))
     for i in range(len(weight)):
         weight[i] = (tukey[i] * pixels[TRUST, i]) ** 2
     factor, coefficients, T = np.empty((m, m)), np.empty((channels, m)), np.empty((2, m))
     squares[:] = 0.0
     normal[:] = 0.0
-    fit_linear(pixels, drawn[:m], weight, work[:m], factor, coefficients)
+    without_room(pixels, drawn[m - PLANE], seen)
+    fit_linear(seen, drawn[:m], weight, work[:m], factor, coefficients)
     for channel in range(channels):
         c = coefficients[channel]
         rows = work[m + 1 + 3 * channel : m + 4 + 3 * channel]
-        _add_channel(pixels, drawn, weight, work[:m], channel, factor, c, rows, T, squares, normal)
+        _add_channel(pixels, seen[channel], drawn, weight, work[:m], channel, factor, c, rows, T, squares, normal)
 
 
 @compiled("UniTuple(f8, 2)(f8[::1], f8[::1], i8, i8, f8[::1])")
@@ -251,49 +254,3 @@ def gauss_newton(
     doubted_covariance(normal, disagreement(normal_b, normal_c), octants, u - at_u, v - at_v, fit[2:5])
     fit[5] = (misfit_b * n_bright + misfit_c * 2 * n_colour) / (n_bright + 2 * n_colour)
     fit[EVIDENCE] = (explained(bright, tukey_b, squares_b) + explained(colour, tukey_c, squares_c)) / max(TINY, fit[5])
-
-
-@compiled("f8(f8[:, ::1], Array(float32, 3, 'C', True), f8[::1], f8[::1], i8, f8, f8, f8[:, ::1])")
-def slopes_at(
-    pixels: Array, fine: NDArray[np.float32], made: Array, ball: Array, variance: int, u: float, v: float, slopes: Array
-) -> float:
-    """Fill in the slopes (2, n) of the first channel, as fitted at a centre (u, v), by that centre [1/px].
-
-    Returns the slope by the blur's variance of half the sum of squares that the fit leaves in all channels [1/px^2]:
-    positive when a sharper ball would fit better.
-    """
-    n, p, channels = pixels.shape[1], fine.shape[2], len(pixels) - LUMA
-    m = p + PLANE
-    drawn, weighted, weight = np.empty((rows_of(p), n)), np.empty((m, n)), pixels[TRUST] ** 2
-    factor, coefficients, rest, bend = np.empty((m, m)), np.empty((channels, m)), np.empty(n), np.empty(n)
-    draw_at(pixels, fine, made, ball, variance, u, v, drawn)
-    fit_linear(pixels, drawn[:m], weight, weighted, factor, coefficients)
-    total = 0.0
-    for channel in range(channels):
-        c = coefficients[channel]
-        residual(drawn[:m], c, pixels[LUMA + channel], rest)
-        slope_of(pixels, drawn[m + 2 * p :], c, bend)
-        for i in range(n):
-            total -= weight[i] * rest[i] * bend[i]
-    slope_of(pixels, drawn[m : m + p], coefficients[0], slopes[0])
-    slope_of(pixels, drawn[m + p : m + 2 * p], coefficients[0], slopes[1])
-    return total
-
-
-@compiled("f8(f8[:, ::1], Array(float32, 3, 'C', True), f8[::1], f8[::1], i8, f8, f8)")
-def squares_at(
-    pixels: Array, fine: NDArray[np.float32], made: Array, ball: Array, variance: int, u: float, v: float
-) -> float:
-    """Return the sum of squares left in brightness or colour at a centre (u, v)."""
-    n, p, channels = pixels.shape[1], fine.shape[2], len(pixels) - LUMA
-    m = p + PLANE
-    drawn, weighted, weight = np.empty((rows_of(p), n)), np.empty((m, n)), pixels[TRUST] ** 2
-    factor, coefficients, rest = np.empty((m, m)), np.empty((channels, m)), np.empty(n)
-    draw_at(pixels, fine, made, ball, variance, u, v, drawn)
-    fit_linear(pixels, drawn[:m], weight, weighted, factor, coefficients)
-    total = 0.0
-    for channel in range(channels):
-        residual(drawn[:m], coefficients[channel], pixels[LUMA + channel], rest)
-        for i in range(n):
-            total += weight[i] * rest[i] * rest[i]
-    return total

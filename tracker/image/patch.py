@@ -7,14 +7,25 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
+from tracker.image.behind import KNOWN, NO_ROOM, WELL_KNOWN, Room, is_known
 from tracker.image.template import MARGIN_PX, STREAK_MAX_PX, Shades, Streak, Template
+from tracker.image.whiten import (
+    BLUE_SCALE,
+    LUMA_SCALE,
+    RED_BY_BLUE,
+    RED_SCALE,
+    ROOM_SHARE,
+    SCALES,
+    colour_of_block,
+    luma_blue_red,
+    whitening,
+)
 from tracker.maths.compiled import compiled
-from tracker.maths.solve import eliminate
 from tracker.types import Array, Image
 
 RING_PX = 1.5  # the background's own variation is measured from this far beyond the ball's edge to the patch's corner
-LEAST_NOISE = 1.5  # one sigma of quantisation and compression, grey levels
 CLIPPED, CLIPPED_TRUST = 254, 0.1  # grey level at which a channel is full; what it shows is too dark
 DARKEST = 0.04  # below this share of white a camera's response is straight
 WHITE = 255.0
@@ -29,8 +40,10 @@ PLANE = 3  # terms of the background
 class Patch:
     """The pixels round a ball.
 
-    bright (4, n): for each pixel X, Y from the middle pixel [px], TRUST, how far it counts, and LUMA.
-    colour (5, n or n / 4): for each pixel or block of 2 x 2 X, Y of its middle, TRUST, BLUE and RED difference.
+    bright (5, n): for each pixel X, Y from the middle pixel [px], TRUST, how far it counts, LUMA, and LUMA of the room
+    behind, 0 where that is not known.
+    colour (7, n or n / 4): for each pixel or block of 2 x 2 X, Y of its middle, TRUST, BLUE and RED difference, and
+    both of the room behind.
     LUMA, BLUE and RED are in units of their noise.
     """
 
@@ -67,7 +80,7 @@ class Expected:
     uv_px: centre within about a pixel.  radius_px: from its size and distance.
     speed_px_s: how fast its image moves.  shades: see `template.Shades`.  response: its camera's.
     drawn: templates of its brightness and its colour that serve for it; None for those of its own.
-    ray: (x, y, 1) leads to it from the camera; None where uv_px must tell.
+    ray: (x, y, 1) leads to it from the camera; None where uv_px must tell.  room: what is known to stand behind.
     """
 
     uv_px: tuple[float, float]
@@ -77,6 +90,7 @@ class Expected:
     response: Response
     drawn: tuple[Template, Template] | None = None
     ray: tuple[float, float] | None = None
+    room: Room = NO_ROOM
 
     @property
     def streak_px(self) -> Streak:
@@ -112,6 +126,12 @@ def extent_of(ball: Expected) -> Extent:
     return Extent(u, v, ball.uv_px[0] - u, ball.uv_px[1] - v, edge_px, math.ceil(edge_px + MARGIN_PX))
 
 
+def behind_is_known(ball: Expected) -> bool:
+    """Say whether all that stands behind a ball's patch has been seen so often without it that it hides nothing."""
+    extent = extent_of(ball)
+    return is_known(ball.room.looks, extent.u, extent.v, extent.half, WELL_KNOWN)
+
+
 def fits_in(image: Image, extent: Extent) -> bool:
     """Say whether a ball's patch lies within its image."""
     height, width, half = int(image.shape[0]), int(image.shape[1]), extent.half
@@ -131,135 +151,85 @@ def trust_of(gamma: float) -> Array:
     return np.asarray(1.0 / (gamma * share ** (gamma - 1.0)))
 
 
-@compiled("UniTuple(f8, 3)(Array(uint8, 3, 'C', True), i8, i8, i8)")
-def _colour_of_block(image: Image, left: int, top: int, block: int) -> tuple[float, float, float]:
-    """Return the mean luma, blue and red difference (ITU-R BT.601) of a block of pixels, in grey levels."""
-    b = g = r = 0
-    for v in range(top, top + block):
-        for u in range(left, left + block):
-            b += image[v, u, 0]
-            g += image[v, u, 1]
-            r += image[v, u, 2]
-    share = 1.0 / (block * block)
-    luma = share * (0.114 * b + 0.587 * g + 0.299 * r)
-    blue = share * (0.5 * b - 0.331264 * g - 0.168736 * r)
-    return luma, blue, share * (-0.081312 * b - 0.418688 * g + 0.5 * r)
-
-
-@compiled("void(f8[:, ::1], f8, f8, f8, f8, i8)")
-def _add_products(products: Array, x: float, y: float, a: float, b: float, count: int) -> None:
-    """Add to the lower triangle of the products of 1, x, y, a and, with a count of 5, b."""
-    products[0, 0] += 1.0
-    products[1, 0] += x
-    products[1, 1] += x * x
-    products[2, 0] += y
-    products[2, 1] += x * y
-    products[2, 2] += y * y
-    products[3, 0] += a
-    products[3, 1] += a * x
-    products[3, 2] += a * y
-    products[3, 3] += a * a
-    if count == 5:
-        products[4, 0] += b
-        products[4, 1] += b * x
-        products[4, 2] += b * y
-        products[4, 3] += b * a
-        products[4, 4] += b * b
-
-
-@compiled("void(Array(uint8, 3, 'C', True), i8, i8, i8, i8, f8, f8, f8, f8[::1])")
-def _whitening(
-    image: Image, u: int, v: int, half: int, block: int, du: float, dv: float, beyond_px: float, scale: Array
-) -> None:
-    """Find the scales of luma and of the two colour differences by the background's variation about a plane.
-
-    Luma varies by pixel, colour by block; colour is made white by Cholesky's factor.
-    """
-    bright, colour = np.zeros((4, 4)), np.zeros((5, 5))  # products of 1, x, y, luma; of 1, x, y, blue, red
-    for top in range(v - half + ((v - half) % block), v + half - block + 2, block):
-        for left in range(u - half + ((u - half) % block), u + half - block + 2, block):
-            x, y = left + (block - 1) / 2 - u, top + (block - 1) / 2 - v
-            if (x - du) ** 2 + (y - dv) ** 2 <= beyond_px**2:
-                continue
-            luma, blue, red = _colour_of_block(image, left, top, block)
-            _add_products(colour, x, y, blue, red, 5)
-            if block == 1:
-                _add_products(bright, x, y, luma, 0.0, 4)
-                continue
-            for row in range(top, top + block):
-                for column in range(left, left + block):
-                    luma, _, _ = _colour_of_block(image, column, row, 1)
-                    _add_products(bright, float(column - u), float(row - v), luma, 0.0, 4)
-    eliminate(bright, 3)
-    eliminate(colour, 3)
-    least, freedom = LEAST_NOISE**2, max(colour[0, 0] - 3.0, 1.0)
-    scale[0] = 1.0 / np.sqrt(max(bright[3, 3], 0.0) / max(bright[0, 0] - 3.0, 1.0) + least)
-    a = np.sqrt(max(colour[3, 3], 0.0) / freedom + least / block)
-    b_over_a = colour[4, 3] / freedom / a
-    c = np.sqrt(max(colour[4, 4] / freedom + least / block - b_over_a * b_over_a, least / block))
-    scale[1] = 1.0 / a
-    scale[2] = 1.0 / c
-    scale[3] = b_over_a / (a * c)
-
-
-@compiled("Tuple((f8[:, ::1], f8[:, ::1]))(Array(uint8, 3, 'C', True), i8, i8, i8, i8, f8, f8, f8, f8[::1], f8[::1])")
+@compiled(
+    "Tuple((f8[:, ::1], f8[:, ::1]))(Array(uint8, 3, 'C', True), Array(f4, 3, 'C'), Array(u1, 2, 'C'), i8, i8, i8, i8,"
+    "f8, f8, f8, f8[::1], f8[::1])"
+)
 def cut_pixels(
-    image: Image,
-    u: int,
-    v: int,
-    half: int,
-    block: int,
-    du: float,
-    dv: float,
-    edge_px: float,
-    light: Array,
-    trust: Array,
-) -> tuple[Array, Array]:
+    image: Image, room: NDArray[np.float32], looks: NDArray[np.uint8], u: int, v: int, half: int, block: int,
+    du: float, dv: float, edge_px: float, light: Array, trust: Array,
+) -> tuple[Array, Array]:  # fmt: skip
     """Cut out and whiten; (u, v) is the middle pixel, (du, dv) the ball's place from there. See `Patch`."""
     pixels = (2 * half + 1) ** 2
-    bright, colour, scale, count = np.empty((4, pixels)), np.empty((5, pixels)), np.zeros(4), 0
-    share = 1.0 / (block * block)
-    _whitening(image, u, v, half, block, du, dv, edge_px + RING_PX, scale)
+    bright, colour, scale, count = np.empty((5, pixels)), np.empty((7, pixels)), np.empty(SCALES), 0
+    share, known = 1.0 / (block * block), is_known(looks, u, v, half, KNOWN)
+    whitening(image, room, known, u, v, half, block, du, dv, edge_px + RING_PX, scale)
+    shows = scale[ROOM_SHARE]
     for top in range(v - half + ((v - half) % block), v + half - block + 2, block):
         for left in range(u - half + ((u - half) % block), u + half - block + 2, block):
             x, y = left + (block - 1) / 2 - u, top + (block - 1) / 2 - v
             if (x - du) ** 2 + (y - dv) ** 2 >= (edge_px + MARGIN_PX) ** 2:
                 continue
-            mean = blue = red = 0.0
+            mean = blue = red = blue_behind = red_behind = 0.0
             clipped = False
             for k in range(block * block):
                 down = k >> (block - 1)  # of a block of two; of one both are 0
                 row, column = top + down, left + k - block * down
                 b, g, r = image[row, column, 0], image[row, column, 1], image[row, column, 2]
-                lb, lg, lr = light[b], light[g], light[r]
+                luma, by_blue, by_red = luma_blue_red(light[b], light[g], light[r])
                 brightness = 0.114 * b + 0.587 * g + 0.299 * r
                 full = max(b, g, r) >= CLIPPED
                 clipped = clipped or full
                 mean += share * brightness
-                blue += share * (0.5 * lb - 0.331264 * lg - 0.168736 * lr)
-                red += share * (-0.081312 * lb - 0.418688 * lg + 0.5 * lr)
+                blue += share * by_blue
+                red += share * by_red
                 i = block * block * count + k
                 bright[X, i] = column - u
                 bright[Y, i] = row - v
                 bright[TRUST, i] = trust[int(brightness + 0.5)] * (CLIPPED_TRUST if full else 1.0)
-                bright[LUMA, i] = (0.114 * lb + 0.587 * lg + 0.299 * lr) * scale[0]
+                bright[LUMA, i] = luma * scale[LUMA_SCALE]
+                bright[LUMA + 1, i] = 0.0
+                if shows > 0.0:
+                    b, g, r = room[row, column, 0] + 0.5, room[row, column, 1] + 0.5, room[row, column, 2] + 0.5
+                    luma, by_blue, by_red = luma_blue_red(light[int(b)], light[int(g)], light[int(r)])
+                    blue_behind += share * by_blue
+                    red_behind += share * by_red
+                    bright[LUMA + 1, i] = shows * luma * scale[LUMA_SCALE]
             colour[X, count] = x
             colour[Y, count] = y
             colour[TRUST, count] = trust[int(mean + 0.5)] * (CLIPPED_TRUST if clipped else 1.0)
-            colour[BLUE, count] = blue * scale[1]
-            colour[RED, count] = red * scale[2] - blue * scale[3]
+            colour[BLUE, count] = blue * scale[BLUE_SCALE]
+            colour[RED, count] = red * scale[RED_SCALE] - blue * scale[RED_BY_BLUE]
+            colour[BLUE + 2, count] = shows * blue_behind * scale[BLUE_SCALE]
+            colour[RED + 2, count] = shows * (red_behind * scale[RED_SCALE] - blue_behind * scale[RED_BY_BLUE])
             count += 1
     return np.ascontiguousarray(bright[:, : count * block**2]), np.ascontiguousarray(colour[:, :count])
 
 
-def cut(image: Image, extent: Extent, response: Response) -> Patch:
+@compiled("i8(f8[:, ::1])")
+def channels_of(pixels: Array) -> int:
+    """Return how many channels the brightness or the colour of a patch has."""
+    return (len(pixels) - LUMA) // 2
+
+
+@compiled("void(f8[:, ::1], f8[::1], f8[:, ::1])")
+def without_room(pixels: Array, bare: Array, seen: Array) -> None:
+    """Fill in what is seen in each channel (channels, n), without the known room where the ball leaves it bare (n,)."""
+    channels = len(seen)
+    for channel in range(channels):
+        for i in range(len(bare)):
+            seen[channel, i] = pixels[LUMA + channel, i] - bare[i] * pixels[LUMA + channels + channel, i]
+
+
+def cut(image: Image, extent: Extent, ball: Expected) -> Patch:
     """Cut out the pixels of a ball whose patch lies within its image.
 
     Light is undone of the camera's gamma, since ball and background mix as light; a pixel's trust falls as gamma
     spreads its noise. Brightness and colour are scaled by what the ring round the ball varies, in grey levels.
     """
-    e, light, trust = extent, light_of(response.gamma), trust_of(response.gamma)
-    return Patch(*cut_pixels(image, e.u, e.v, e.half, response.block_px, e.du, e.dv, e.edge_px, light, trust))
+    e, block, gamma = extent, ball.response.block_px, ball.response.gamma
+    light, trust = light_of(gamma), trust_of(gamma)
+    return Patch(*cut_pixels(image, *ball.room, e.u, e.v, e.half, block, e.du, e.dv, e.edge_px, light, trust))
 
 
 @compiled("f8(Array(uint8, 3, 'C', True), i8, i8, i8)")
@@ -268,8 +238,8 @@ def _detail(image: Image, u: int, v: int, half: int) -> float:
     squares = np.zeros(2)
     for row in range(v - half, v + half + 1):
         for column in range(u - half, u + half):
-            _, blue, red = _colour_of_block(image, column, row, 1)
-            _, next_blue, next_red = _colour_of_block(image, column + 1, row, 1)
+            _, blue, red = colour_of_block(image, column, row, 1)
+            _, next_blue, next_red = colour_of_block(image, column + 1, row, 1)
             squares[column % 2] += (blue - next_blue) ** 2 + (red - next_red) ** 2
     return float(squares[0] / max(squares[1], 1.0))
 

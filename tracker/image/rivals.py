@@ -3,13 +3,14 @@
 Light learned under a wrong gamma hides the error, so a gamma cannot be learned in small steps as blur is: each rival
 learns its own light and blur from the same balls. What their images leave unexplained is least at the camera's gamma
 and grows with the square of the distance from it, so a parabola through three rivals tells it. Rivals closer together
-would differ by less than by chance. A camera's gamma does not change, so the search ends there.
+would differ by less than by chance. A camera's gamma does not change, so the search ends there. Writing or books behind
+the balls may well mislead it; so it begins again, once, when balls pass where the room behind them is known.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,13 +18,15 @@ import numpy as np
 from tracker.camera import Camera
 from tracker.image.appearance import MISFIT_MAX, Appearance
 from tracker.image.centre import Centre, fit_centre
-from tracker.image.patch import Expected, Response
+from tracker.image.patch import Expected, Response, behind_is_known
 from tracker.types import Array, Image
 
 GAMMAS = (1.0, 1.6, 2.2)
-MOST_GAMMA, BEYOND = 2.8, 0.3  # where the highest is the best, rivals this far on either side of it are next
-SEARCHING, FOUND, AT_THE_END = 0.3, 0.12, 0.04
-"""One sigma of a gamma: of the best rival, of one that three told, and of 1, where the range ends."""
+MOST_GAMMA, BEYOND = 2.8, 0.3  # where the outermost is the best, rivals this far on either side of it are next
+APART = 0.6  # as far on either side of a gamma found lie those that it is tried against once the room is known
+SEARCHING, FOUND, FOUND_BY_ROOM, AT_THE_END = 0.3, 0.15, 0.08, 0.04
+"""One sigma of a gamma: of the best rival, of one that three told, the same by balls behind which the room is known,
+and of 1, where the range ends."""
 ROUND_BALLS, LONG_ROUND_BALLS = 54, 90  # balls that a set of rivals learns from before it is judged: the long round
 CLEAR = 0.25  # where their misfits' logarithms differ by less than this; by chance it is about 0.05
 FIRST_LESSONS, FIRST_BALLS = 4, 12
@@ -36,18 +39,25 @@ class Rivals:
 
     appearances: one a gamma.  misfits: of each, recent mean of the logarithm.  count: balls learned since they were
     set up.  pull_px (2,): recent mean of how far a centre moves with gamma, a unit of it.
+    by_room: whether only balls count, or counted, behind which the room is known.
     """
 
     appearances: tuple[Appearance, ...]
     misfits: tuple[float, ...]
     count: int
     pull_px: Array
+    by_room: bool = False
 
     @property
     def doubt_px(self) -> float:
         """Return by how much, one sigma, all centres may be wrong together since gamma is not known exactly [px]."""
         gamma = self.best.response.gamma
-        doubt = SEARCHING if not self.settled else AT_THE_END if gamma == GAMMAS[0] else FOUND
+        if not self.settled:
+            doubt = SEARCHING
+        elif gamma == GAMMAS[0]:
+            doubt = AT_THE_END
+        else:
+            doubt = FOUND_BY_ROOM if self.by_room else FOUND
         return doubt * math.hypot(*self.pull_px)
 
     @property
@@ -69,9 +79,16 @@ class Rivals:
         """Return the rivals after one more ball; arguments as for `Appearance.learned`."""
         if found.misfit > MISFIT_MAX:
             return self
+        known = behind_is_known(ball)
+        if self.settled and known and not self.by_room:
+            return _around(self.best, APART, self.pull_px, by_room=True).learned(image, camera, ball, found)
         if self.settled:
-            known = self.appearances[0].learned(image, camera, ball, found)
-            return replace(self, appearances=(known,), count=self.count + 1)
+            if ball.response.gamma != self.best.response.gamma:
+                return self  # looked at before this gamma was found
+            one = self.best.learned(image, camera, ball, found)
+            return replace(self, appearances=(one,), count=self.count + 1)
+        if self.by_room and not known:
+            return self
         appearances, misfits, centres = [], [], []
         share = max(1.0 - FORGETTING, 1.0 / (self.count + 1))
         for rival, misfit in zip(self.appearances, self.misfits, strict=True):
@@ -84,7 +101,7 @@ class Rivals:
             misfits.append(misfit + share * (float(np.log(fit.misfit)) - misfit))
         apart = appearances[-1].response.gamma - appearances[0].response.gamma
         pull_px = self.pull_px + share * ((centres[-1] - centres[0]) / apart - self.pull_px)
-        after = Rivals(tuple(appearances), tuple(misfits), self.count + 1, pull_px)
+        after = Rivals(tuple(appearances), tuple(misfits), self.count + 1, pull_px, self.by_room)
         return after._judged() if after._due() else after
 
     def _due(self) -> bool:
@@ -93,13 +110,13 @@ class Rivals:
         return self.count >= (ROUND_BALLS if clear else LONG_ROUND_BALLS)
 
     def _judged(self) -> Rivals:
-        """Return one appearance, of the gamma that they tell, or rivals further up where it may lie beyond them."""
-        best = self.best
-        gammas = [appearance.response.gamma for appearance in self.appearances]
-        highest = best.response.gamma == gammas[-1]
-        if highest and gammas[-1] < MOST_GAMMA:
-            return _rivals((best.with_gamma(gammas[-1] + k * BEYOND) for k in (-1, 0, 1)), self.pull_px)
-        return _rivals([best.with_gamma(_lowest_point(gammas, self.misfits))], self.pull_px)
+        """Return one appearance, of the gamma that they tell, or rivals further on where it may lie beyond them."""
+        best, gammas = self.best, [appearance.response.gamma for appearance in self.appearances]
+        gamma = best.response.gamma
+        if (gamma == gammas[-1] and gamma < MOST_GAMMA) or (gamma == gammas[0] and gamma > GAMMAS[0]):
+            return _around(best, BEYOND, self.pull_px, by_room=self.by_room)
+        found = best.with_gamma(_lowest_point(gammas, self.misfits))
+        return Rivals((found,), (0.0,), 0, self.pull_px, self.by_room)
 
 
 def _lowest_point(gammas: Sequence[float], misfits: Sequence[float]) -> float:
@@ -112,11 +129,13 @@ def _lowest_point(gammas: Sequence[float], misfits: Sequence[float]) -> float:
     return min(gammas[2], max(gammas[0], at))
 
 
-def _rivals(appearances: Iterable[Appearance], pull_px: Array) -> Rivals:
-    together = tuple(appearances)
-    return Rivals(together, (0.0,) * len(together), 0, pull_px)
+def _around(best: Appearance, apart: float, pull_px: Array, *, by_room: bool) -> Rivals:
+    """Return rivals as far apart as that, the best in their middle unless its gamma is near the least there is."""
+    lowest = max(GAMMAS[0], best.response.gamma - apart)
+    appearances = tuple(best.with_gamma(gamma) for gamma in (lowest, lowest + apart, lowest + 2.0 * apart))
+    return Rivals(appearances, (0.0, 0.0, 0.0), 0, pull_px, by_room)
 
 
 def first_rivals() -> Rivals:
     """Return the rivals before anything was seen."""
-    return _rivals((Appearance(Response(gamma=gamma)) for gamma in GAMMAS), np.zeros(2))
+    return Rivals(tuple(Appearance(Response(gamma=gamma)) for gamma in GAMMAS), (0.0,) * len(GAMMAS), 0, np.zeros(2))

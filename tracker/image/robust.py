@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.image.newton import LEAST_WEIGHT, TUKEY, draw_at, fit_linear, residual, rows_of
-from tracker.image.patch import LUMA, PLANE, TRUST
+from tracker.image.patch import PLANE, TRUST, channels_of, without_room
 from tracker.maths.compiled import compiled
 from tracker.types import Array
 
@@ -28,17 +28,18 @@ def without_strangers(
     The spread of what the fit leaves is its own, however noisy the camera: half of the pixels lie within its median.
     Source: Tukey's biweight, Huber, Ronchetti, "Robust Statistics", 2009.
     """
-    n, p, channels = pixels.shape[1], fine.shape[2], len(pixels) - LUMA
+    n, p, channels = pixels.shape[1], fine.shape[2], channels_of(pixels)
     m = p + PLANE
     drawn, weighted, weight = np.empty((rows_of(p), n)), np.empty((m, n)), pixels[TRUST] ** 2
-    factor, coefficients = np.empty((m, m)), np.empty((channels, m))
+    factor, coefficients, seen = np.empty((m, m)), np.empty((channels, m)), np.empty((channels, n))
     rest, squares, believed = np.empty(n), np.empty(n), np.ones(n)
     draw_at(pixels, fine, made, ball, variance, u, v, drawn)
+    without_room(pixels, drawn[p], seen)
     for _ in range(ROUNDS):
-        fit_linear(pixels, drawn[:m], weight, weighted, factor, coefficients)
+        fit_linear(seen, drawn[:m], weight, weighted, factor, coefficients)
         squares[:] = 0.0
         for channel in range(channels):
-            residual(drawn[:m], coefficients[channel], pixels[LUMA + channel], rest)
+            residual(drawn[:m], coefficients[channel], seen[channel], rest)
             for i in range(n):
                 squares[i] += (pixels[TRUST, i] * rest[i]) ** 2
         spread = np.median(squares) / MEDIANS[channels - 1]

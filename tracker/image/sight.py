@@ -7,6 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.image.behind import Room
 from tracker.image.centre import MAX_SHIFT_PX
 from tracker.image.colour_table import ColourTable
 from tracker.image.evidence import LEAST_EVIDENCE
@@ -45,12 +46,18 @@ def known_of(response: Response) -> Known:
 
 
 def find_ball(
-    image: Image, colour: ColourTable, view: Array, known: Known, drawn: tuple[Template, Template], fit: Array
+    image: Image,
+    room: Room,
+    colour: ColourTable,
+    view: Array,
+    known: Known,
+    drawn: tuple[Template, Template],
+    fit: Array,
 ) -> Reason | None:
     """Find a ball near a prediction and fit its centre.
 
     Args:
-        image: (height, width, 3) BGR.
+        image: (height, width, 3) BGR.  room: what is known to stand behind.
         colour: of this ball alone.
         view: a row of `view.expected_views`, finite.
         known: of the camera.
@@ -61,7 +68,7 @@ def find_ball(
         cut off.
     """
     luma, chroma = drawn
-    status = _find_and_fit(image, *colour, view, *known, *luma, *chroma, fit)
+    status = _find_and_fit(image, room.mean, room.looks, *colour, view, *known, *luma, *chroma, fit)
     return None if status == _FOUND else _REASONS[status]
 
 
@@ -103,12 +110,14 @@ def _nearest_spot(
 
 
 @compiled(
-    "i8(Array(u1, 3, 'C', True), Array(i2, 2, 'C', True), Array(i2, 1, 'C', True), Array(b1, 2, 'C', True), i8, i8,"
+    "i8(Array(u1, 3, 'C', True), Array(f4, 3, 'C'), Array(u1, 2, 'C'),"
+    "Array(i2, 2, 'C', True), Array(i2, 1, 'C', True), Array(b1, 2, 'C', True), i8, i8,"
     "f8[::1], f8[::1], i8, f8[::1], f8[::1], Array(f4, 3, 'C', True), f8[::1], Array(f4, 3, 'C', True), f8[::1],"
     "f8[::1])"
 )
 def _find_and_fit(
-    image: Image, least_spread: NDArray[np.int16], lowest_spread: NDArray[np.int16], hues: NDArray[np.bool_],
+    image: Image, room: NDArray[np.float32], looks: NDArray[np.uint8],
+    least_spread: NDArray[np.int16], lowest_spread: NDArray[np.int16], hues: NDArray[np.bool_],
     blue: int, red: int, view: Array, answers: Array, block: int, light: Array, trust: Array,
     luma: NDArray[np.float32], luma_made: Array, chroma: NDArray[np.float32], chroma_made: Array, fit: Array,
 ) -> int:  # fmt: skip
@@ -126,7 +135,7 @@ def _find_and_fit(
     if not (half <= middle_u < width - half and half <= middle_v < height - half):
         return _CUT_OFF
     du, dv = spot_u - middle_u, spot_v - middle_v
-    bright, colour = cut_pixels(image, middle_u, middle_v, half, block, du, dv, edge_px, light, trust)
+    bright, colour = cut_pixels(image, room, looks, middle_u, middle_v, half, block, du, dv, edge_px, light, trust)
     gauss_newton(bright, colour, luma, luma_made, chroma, chroma_made, ball, du, dv, found)
     if not (found[0] - du) ** 2 + (found[1] - dv) ** 2 <= MAX_SHIFT_PX**2:
         return _RAN_AWAY

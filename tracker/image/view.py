@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from tracker.camera import Camera
-from tracker.filter.measure import camera_table, marker_points, pixels
+from tracker.filter.measure import camera_table, marker_points, pixels, project
 from tracker.maths.compiled import compiled
 from tracker.rig import Rig
 from tracker.state import State
@@ -51,6 +51,24 @@ def _rolled(views: Array, camera: Camera) -> Array:
     views[:, U] += late_s * views[:, SPEED_U]
     views[:, V] += late_s * views[:, SPEED_V]
     return views
+
+
+CLEAR = 3.0  # times as far from its middle as the balls a vehicle reaches, with rotor and tail
+
+
+def whereabouts(state: State, rig: Rig, camera: int) -> tuple[float, float, float]:
+    """Return where a camera sees the vehicle's middle (u, v), NaN behind it, and how far round it reaches [px]."""
+    return _whereabouts(state.mean, camera_table(rig)[camera], CLEAR * _reach_m(rig) * rig.cameras[camera].focal_px)
+
+
+@compiled("UniTuple(f8, 3)(f8[::1], f8[::1], f8)")
+def _whereabouts(mean: Array, camera: Array, reach: float) -> tuple[float, float, float]:
+    """Return what `whereabouts` does; reach [m px]."""
+    distance2 = 0.0
+    for i in range(3):
+        distance2 += (mean[i] - camera[21 + i]) ** 2
+    u, v = project(mean[:3], camera, np.empty((2, 3)))
+    return u, v, reach / math.sqrt(distance2)
 
 
 @compiled("void(f8[::1], f8[::1], f8[::1], f8[::1])")

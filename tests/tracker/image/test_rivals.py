@@ -10,6 +10,7 @@ import pytest
 from tests.tracker.drawing import developed, draw_ball, empty_canvas
 from tests.tracker.paper_rig import paper_rig
 from tracker.image.appearance import Appearance
+from tracker.image.behind import ENOUGH, NO_ROOM, TILE_PX, Room
 from tracker.image.centre import Centre, fit_centre
 from tracker.image.light import Light
 from tracker.image.patch import Expected, Response
@@ -18,6 +19,10 @@ from tracker.image.template import FLAT
 
 CAMERA, BALL = paper_rig().cameras[0], paper_rig().marker.balls[1]
 UV_PX = np.array([300.3, 240.4])
+KNOWN_ROOM = Room(
+    empty_canvas(CAMERA).astype(np.float32),
+    np.full((CAMERA.height_px // TILE_PX, CAMERA.width_px // TILE_PX), ENOUGH, np.uint8),
+)
 
 
 def after(balls: int, since: int) -> Rivals:
@@ -34,6 +39,22 @@ def judged(*misfits: float) -> Rivals:
     canvas = empty_canvas(CAMERA)
     draw_ball(canvas, UV_PX, 4.0, BALL)
     ball = Expected((UV_PX[0], UV_PX[1]), 4.0, (0.0, 0.0), FLAT, Response())
+    found = fit_centre(developed(canvas), ball)
+    assert isinstance(found, Centre)
+    return rivals.learned(developed(canvas), CAMERA, ball, found)
+
+
+def settled_at(gamma: float) -> Rivals:
+    """Return a search that is over, made before the room was known."""
+    return Rivals((Appearance(Response(gamma=gamma)),), (0.0,), 200, np.zeros(2))
+
+
+def one_ball_more(rivals: Rivals, room: Room, gamma: float | None = None) -> Rivals:
+    """Return the rivals after a ball before a room, looked at as one of such a gamma, or of the best one's."""
+    canvas = empty_canvas(CAMERA)
+    draw_ball(canvas, UV_PX, 4.0, BALL)
+    response = Response(gamma=rivals.best.response.gamma if gamma is None else gamma)
+    ball = Expected((UV_PX[0], UV_PX[1]), 4.0, (0.0, 0.0), FLAT, response, room=room)
     found = fit_centre(developed(canvas), ball)
     assert isinstance(found, Centre)
     return rivals.learned(developed(canvas), CAMERA, ball, found)
@@ -74,3 +95,33 @@ def test_a_gamma_that_may_be_higher_than_all_rivals_is_looked_for_up_there() -> 
 
 def test_of_misfits_without_a_lowest_point_the_lower_end_is_believed() -> None:
     assert gammas(judged(0.0, 1.5, 2.0)) == [1.0]
+
+
+@pytest.mark.parametrize(("found", "tried"), [(1.7, [1.1, 1.7, 2.3]), (1.2, [1.0, 1.6, 2.2])])
+def test_once_the_room_is_known_the_gamma_is_looked_for_again(found: float, tried: list[float]) -> None:
+    again = one_ball_more(settled_at(found), KNOWN_ROOM)
+    assert gammas(again) == pytest.approx(tried)
+    assert again.by_room
+
+
+def test_a_gamma_found_by_the_room_is_kept() -> None:
+    once = replace(settled_at(1.7), by_room=True)
+    assert one_ball_more(once, KNOWN_ROOM).settled
+    assert one_ball_more(settled_at(1.7), NO_ROOM).settled
+
+
+def test_in_the_search_by_the_room_other_balls_do_not_count() -> None:
+    again = one_ball_more(settled_at(1.7), KNOWN_ROOM)
+    assert one_ball_more(again, NO_ROOM).count == again.count == 1
+    assert one_ball_more(again, KNOWN_ROOM).count == 2
+
+
+def test_a_ball_looked_at_under_another_gamma_teaches_nothing_once_one_is_found() -> None:
+    once = replace(settled_at(1.7), by_room=True)
+    assert one_ball_more(once, KNOWN_ROOM, gamma=1.0) is once
+
+
+def test_where_the_lowest_rival_is_the_best_lower_ones_are_tried() -> None:
+    again = one_ball_more(settled_at(1.9), KNOWN_ROOM)
+    due = replace(again, misfits=(0.0, 1.0, 2.0), count=ROUND_BALLS - 1)
+    assert gammas(one_ball_more(due, KNOWN_ROOM)) == pytest.approx([1.0, 1.3, 1.6])

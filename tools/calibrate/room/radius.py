@@ -122,7 +122,7 @@ def _parabola(image: Image, ball: Expected) -> tuple[Array, Array] | None:
     if not isinstance(found, Centre) or found.misfit > MISFIT_MAX:
         return None
     extent = extent_of(replace(ball, radius_px=ball.radius_px * (1.0 + STEP)))
-    patch = cut(image, extent, ball.response)
+    patch = cut(image, extent, ball)
     centre = float(found.uv_px[0]) - extent.u, float(found.uv_px[1]) - extent.v
 
     def left(radius: float, blur: float) -> float:
