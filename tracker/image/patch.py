@@ -131,9 +131,22 @@ def trust_of(gamma: float) -> Array:
     return np.asarray(1.0 / (gamma * share ** (gamma - 1.0)))
 
 
+@compiled("UniTuple(f8, 3)(f8, f8, f8)")
+def _colour_of(b: float, g: float, r: float) -> tuple[float, float, float]:
+    """Return the luma, blue and red difference of a colour (ITU-R BT.601)."""
+    luma, blue = 0.114 * b + 0.587 * g + 0.299 * r, 0.5 * b - 0.331264 * g - 0.168736 * r
+    return luma, blue, -0.081312 * b - 0.418688 * g + 0.5 * r
+
+
+@compiled("UniTuple(f8, 3)(Array(uint8, 3, 'C', True), i8, i8)")
+def _colour_at(image: Image, column: int, row: int) -> tuple[float, float, float]:
+    """Return the luma, blue and red difference of a pixel, in grey levels."""
+    return _colour_of(image[row, column, 0], image[row, column, 1], image[row, column, 2])
+
+
 @compiled("UniTuple(f8, 3)(Array(uint8, 3, 'C', True), i8, i8, i8)")
 def _colour_of_block(image: Image, left: int, top: int, block: int) -> tuple[float, float, float]:
-    """Return the mean luma, blue and red difference (ITU-R BT.601) of a block of pixels, in grey levels."""
+    """Return the mean luma, blue and red difference of a block of pixels, in grey levels."""
     b = g = r = 0
     for v in range(top, top + block):
         for u in range(left, left + block):
@@ -141,9 +154,7 @@ def _colour_of_block(image: Image, left: int, top: int, block: int) -> tuple[flo
             g += image[v, u, 1]
             r += image[v, u, 2]
     share = 1.0 / (block * block)
-    luma = share * (0.114 * b + 0.587 * g + 0.299 * r)
-    blue = share * (0.5 * b - 0.331264 * g - 0.168736 * r)
-    return luma, blue, share * (-0.081312 * b - 0.418688 * g + 0.5 * r)
+    return _colour_of(share * b, share * g, share * r)
 
 
 @compiled("void(f8[:, ::1], f8, f8, f8, f8, i8)")
@@ -181,14 +192,16 @@ def _whitening(
             x, y = left + (block - 1) / 2 - u, top + (block - 1) / 2 - v
             if (x - du) ** 2 + (y - dv) ** 2 <= beyond_px**2:
                 continue
-            luma, blue, red = _colour_of_block(image, left, top, block)
-            _add_products(colour, x, y, blue, red, 5)
             if block == 1:
+                luma, blue, red = _colour_at(image, left, top)
                 _add_products(bright, x, y, luma, 0.0, 4)
+                _add_products(colour, x, y, blue, red, 5)
                 continue
+            _, blue, red = _colour_of_block(image, left, top, block)
+            _add_products(colour, x, y, blue, red, 5)
             for row in range(top, top + block):
                 for column in range(left, left + block):
-                    luma, _, _ = _colour_of_block(image, column, row, 1)
+                    luma, _, _ = _colour_at(image, column, row)
                     _add_products(bright, float(column - u), float(row - v), luma, 0.0, 4)
     eliminate(bright, 3)
     eliminate(colour, 3)
@@ -268,8 +281,8 @@ def _detail(image: Image, u: int, v: int, half: int) -> float:
     squares = np.zeros(2)
     for row in range(v - half, v + half + 1):
         for column in range(u - half, u + half):
-            _, blue, red = _colour_of_block(image, column, row, 1)
-            _, next_blue, next_red = _colour_of_block(image, column + 1, row, 1)
+            _, blue, red = _colour_at(image, column, row)
+            _, next_blue, next_red = _colour_at(image, column + 1, row)
             squares[column % 2] += (blue - next_blue) ** 2 + (red - next_red) ** 2
     return float(squares[0] / max(squares[1], 1.0))
 
