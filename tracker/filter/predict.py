@@ -102,15 +102,21 @@ def _ahead(
     of: strengths of the levels.  walk: variance that each clock offset gains [s^2].
     """
     size, pivot = len(P), best_known(mean, P)
-    start, there = moved_to(mean, pivot, size)
-    after, F = carried(start, dt, T, size)
-    after, back = moved_to(after, -pivot, size)
-    coasted = _conjugated(_sparse_product(F, there), P)
+    turn_open = pivot.any()
+    if turn_open:
+        start, there = moved_to(mean, pivot, size)
+        after, F = carried(start, dt, T, size)
+        F = _sparse_product(F, there)
+    else:
+        after, F = carried(mean, dt, T, size)
+    coasted = _conjugated(F, P)
     for i in range(OFFSETS, size):
         coasted[i, i] += walk
     then = later(levels, dt)
     P_then = coasted + process_noise(size, dt, T, expected(then, of))
-    return after, _conjugated(back, coasted), _conjugated(back, P_then), then, pivot
+    if turn_open:
+        after, coasted, P_then = _told_of(after, -pivot, coasted, P_then)
+    return after, coasted, P_then, then, pivot
 
 
 def first_guess(state: State, process: Process) -> Prediction:
