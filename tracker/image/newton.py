@@ -150,7 +150,8 @@ def _linearise(pixels: Array, drawn: Array, tukey: Array, work: Array, squares: 
     weight = work[m]
     for i in range(len(weight)):
         weight[i] = (tukey[i] * pixels[TRUST, i]) ** 2
-    factor, coefficients, T = np.empty((m, m)), np.empty((channels, m)), np.empty((2, m))
+    small = np.empty((m + channels + 2, m))  # in one piece: to ask for memory takes as long as to solve
+    factor, coefficients, T = small[:m], small[m : m + channels], small[m + channels :]
     squares[:] = 0.0
     normal[:] = 0.0
     fit_linear(pixels, drawn[:m], weight, work[:m], factor, coefficients)
