@@ -1,7 +1,7 @@
 """One camera's memory of the room behind the vehicle, and whether it still sees it where it was.
 
-    choose patches, away from the balls -> look up a few of them each round -> after each has had its turn, one Shift,
-    in the round after -> beyond doubt in passes one after the other: moved
+    choose patches, away from the balls -> look up a few of them each round -> after each has had its turn, one Shift
+    -> beyond doubt in passes one after the other: moved
 
 No hand, no vehicle and no change of light moves most of a room at once.
 """
@@ -65,13 +65,11 @@ class Background:
 
     @property
     def due_ns(self) -> int:
-        """Return when the next patch is to be looked up, or what all of them showed is to be judged [ns]."""
+        """Return when the next patch is to be looked up [ns]."""
         if self._patches is None:
             return self._begun_ns
         if len(self._patches) < LEAST_PATCHES:
             return NEVER_NS
-        if len(self._moved) == len(self._patches):
-            return self._begun_ns  # in the next round: looking and judging together would hold one up
         return self._begun_ns + len(self._moved) * self._pass_ns // len(self._patches)
 
     @property
@@ -84,7 +82,7 @@ class Background:
         self._pass_ns = HURRIED_NS
 
     def look(self, image: Image, t_ns: int, balls_px: Array = NOTHING_PX, off_px: float = 0.0) -> bool:
-        """Look up the patch that is due in an image taken at t_ns [ns], or end the pass; say whether it ended.
+        """Look up the patches that are due in an image taken at t_ns [ns]; say whether that ended a pass.
 
         Args:
             balls_px: (n, 2) where the balls are.  off_px: the vehicle reaches so far around them.
@@ -101,8 +99,8 @@ class Background:
             self._begin(t_ns)  # the clock was set back
         if t_ns < self.due_ns:
             return False
+        self._moved.append(self._find(self._patches[len(self._moved)], image))
         if len(self._moved) < len(self._patches):
-            self._moved.append(self._find(self._patches[len(self._moved)], image))
             return False
         self._judge()
         self._begin(t_ns)
