@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from bridge.alarms import Alarm, Limits, Standing, advance, standing_alarms
+from bridge.alarms import Alarm, Limits, Readings, Standing, advance, standing_alarms
 from bridge.alarms.watch import NOTHING
 from bridge.clock import Nanoseconds
 from bridge.monitor import Monitor
@@ -40,6 +40,7 @@ class Telemetry:
         self._stopwatch = stopwatch
         self._gauges = Gauges(names)
         self._standing: Standing = NOTHING
+        self._unjudged: Readings | None = None
         self._watch_due_ns: int | None = None
         self._check_due_ns = 0
         self._checks = 0
@@ -64,6 +65,7 @@ class Telemetry:
 
     def alarms(self) -> tuple[Alarm, ...]:
         """Return the alarms that stand."""
+        self._judge()
         return standing_alarms(self._standing, self._gauges.now_ns)
 
     def snapshot(self, around: Around, *, ended: bool = False) -> Snapshot:
@@ -82,12 +84,20 @@ class Telemetry:
             self._post = None
 
     def _watch(self, around: Around) -> None:
-        """Judge the readings, a few times a second of stream time."""
+        """Take readings a few times a second of stream time, and judge them at the next one: no pose waits for both."""
         now_ns = self._gauges.now_ns
         if self._watch_due_ns is None or now_ns >= self._watch_due_ns:
+            self._judge()
             self._watch_due_ns = now_ns + WATCH_NS
-            readings = readings_of(self._gauges, around(), self._limits)
-            self._standing = advance(self._standing, readings)
+            self._unjudged = readings_of(self._gauges, around(), self._limits)
+        elif self._unjudged is not None and now_ns > self._unjudged.t_ns:
+            self._judge()
+
+    def _judge(self) -> None:
+        """Judge the newest readings, unless that is done."""
+        if self._unjudged is not None:
+            self._standing = advance(self._standing, self._unjudged)
+            self._unjudged = None
 
     def _publish(self, post: Post, around: Around) -> None:
         """Look for listeners ten times a second, and give those there are every second time a snapshot."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from itertools import chain, cycle, islice
 
 from bridge.settings import Settings, rig_of
@@ -42,4 +41,4 @@ class Footage:
         once = self.pairs if self._closed else chain(self.pairs, self.pairs[-2:0:-1])
         for k, pair in enumerate(islice(cycle(once), instants)):
             t_ns = START_NS + k * PERIOD_NS
-            yield tuple(replace(frame, t_ns=t_ns, available_ns=self._stopwatch()) for frame in pair)
+            yield tuple([Frame(frame.camera, t_ns, frame.image, self._stopwatch()) for frame in pair])

@@ -66,10 +66,9 @@ class Batch(NamedTuple):
 def make_batch(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig) -> Batch:
     """Compare sightings with a prediction. A ball predicted behind its camera has NaN for an innovation."""
     state, T = ahead.state, ahead.process.manoeuvre_s
-    cameras, balls, lags_ns = np.array([(s.camera, s.ball, s.t_ns - state.t_ns) for s in sightings]).T.copy()
-    lags_s = lags_ns * 1e-9
-    z = np.concatenate([s.uv_px for s in sightings])
-    covs_px = np.concatenate([s.cov_px for s in sightings])
+    seen_by, seen, stamps_ns, uvs_px, covs_px2 = zip(*sightings, strict=True)
+    cameras, balls, lags_s = np.array(seen_by), np.array(seen), (np.array(stamps_ns) - state.t_ns) * 1e-9
+    z, covs_px = np.concatenate(uvs_px), np.concatenate(covs_px2)
     y, R, A, B, path, doubt = _compared(
         state.mean, state.P, ahead.P_coasted, ahead.dt, T, z, covs_px, state.noise, cameras, balls, lags_s,
         camera_table(rig), ahead.points_of(rig), ahead.turn_open,

@@ -113,10 +113,12 @@ def path_noise(H: Array, cameras: Indices, lags_s: Array, T: float) -> Array:
     """
     n = len(cameras)
     path = np.zeros((KINDS * MOTIONS, 2 * n, 2 * n))
+    lag_s, unit = 0.0, np.empty((KINDS, 4, 4))
     for s in range(n):
         if lags_s[s] == 0.0:
             continue
-        unit = unit_noise(abs(lags_s[s]), T)
+        if lags_s[s] != lag_s:  # a camera's sightings mostly share theirs
+            lag_s, unit = lags_s[s], unit_noise(abs(lags_s[s]), T)
         for i in range(2 * s, 2 * s + 2):
             for j in range(2 * n):
                 if cameras[j // 2] == cameras[s]:

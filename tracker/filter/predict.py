@@ -60,11 +60,11 @@ def predict(state: State, t_ns: int, process: Process) -> Prediction:
         raise ValueError(f"cannot predict back by {-dt} s")
     walk = OFFSET_WALK**2 * dt if process.clock_offset_s > 0.0 else 0.0
     of = manoeuvre.strengths(process)
-    mean, P_coasted, P, levels, pivot_inB = _ahead(
+    mean, P_coasted, P, levels, pivot_inB, turn_open = _ahead(
         state.mean, state.P, state.levels, of, dt, process.manoeuvre_s, walk
     )  # fmt: skip
     ahead = state.at_mean(t_ns, mean, P, levels, state.noise)
-    return Prediction(ahead, P_coasted, dt, process, pivot_inB if pivot_inB.any() else ORIGIN)
+    return Prediction(ahead, P_coasted, dt, process, pivot_inB if turn_open else ORIGIN)
 
 
 @compiled("f8[:, ::1](f8[:, ::1], f8[:, ::1])")
@@ -92,25 +92,33 @@ def _told_of(mean: Array, point_inB: Array, P: Array, P_coasted: Array) -> tuple
     return moved, _conjugated(J, P), _conjugated(J, P_coasted)
 
 
-@compiled("Tuple((f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1]))"
+@compiled("Tuple((f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], b1))"
           "(f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8, f8, f8)")  # fmt: skip
 def _ahead(
     mean: Array, P: Array, levels: Array, of: Array, dt: float, T: float, walk: float
-) -> tuple[Array, Array, Array, Array, Array]:
-    """Return mean, coasted covariance F P F', that with the expected manoeuvre, and levels, after dt; and the pivot.
+) -> tuple[Array, Array, Array, Array, Array, bool]:
+    """Return mean, coasted covariance F P F', that with the expected manoeuvre, and levels, after dt; then the pivot.
+
+    And whether a turn is open: without one there is no pivot, and the state stays told of the origin.
 
     of: strengths of the levels.  walk: variance that each clock offset gains [s^2].
     """
     size, pivot = len(P), best_known(mean, P)
-    start, there = moved_to(mean, pivot, size)
-    after, F = carried(start, dt, T, size)
-    after, back = moved_to(after, -pivot, size)
-    coasted = _conjugated(_sparse_product(F, there), P)
+    turn_open = bool(pivot.any())
+    if turn_open:
+        start, there = moved_to(mean, pivot, size)
+        after, F = carried(start, dt, T, size)
+        F = _sparse_product(F, there)
+    else:
+        after, F = carried(mean, dt, T, size)
+    coasted = _conjugated(F, P)
     for i in range(OFFSETS, size):
         coasted[i, i] += walk
     then = later(levels, dt)
     P_then = coasted + process_noise(size, dt, T, expected(then, of))
-    return after, _conjugated(back, coasted), _conjugated(back, P_then), then, pivot
+    if turn_open:
+        after, coasted, P_then = _told_of(after, -pivot, coasted, P_then)
+    return after, coasted, P_then, then, pivot, turn_open
 
 
 def first_guess(state: State, process: Process) -> Prediction:

@@ -49,7 +49,7 @@ class Album:
         self.draws_left: int | None = None
         self._camera = camera
         self._serving: dict[tuple[int, int], tuple[Wanted, Template]] = {}  # by ball and side of the box
-        self._as_wanted: dict[int, tuple[Steps, tuple[Template, Template]]] = {}  # by ball, no neighbours
+        self._served: dict[int, tuple[Steps, tuple[Template, Template], bool]] = {}  # by ball, and whether as wanted
         self._drawn: dict[Wanted, Template] = {}
         self._looks: Looks = (0, 0, 0, Light())
         self._take_up(Appearance())
@@ -64,23 +64,23 @@ class Album:
         radius_px, ray_x, ray_y = view[RADIUS], view[RAY_X], view[RAY_Y]
         x_steps, y_steps = (round(ray_x / BEARING_STEP_RAD), round(ray_y / BEARING_STEP_RAD)) if self._lit else (0, 0)
         steps = round(radius_px / RADIUS_STEP_PX), x_steps, y_steps, radius_px < SMALL_PX
-        before = self._as_wanted.get(ball)
-        if before is not None and before[0] == steps:
+        before = self._served.get(ball)
+        if before is not None and before[0] == steps and (before[2] or self.draws_left == 0):
             return before[1]
         return self._look_up(ball, steps, view, appearance)
 
     def _look_up(
         self, ball: int, steps: Steps, view: Sequence[float], appearance: Appearance
     ) -> tuple[Template, Template]:
-        """Return the templates for these steps, and note them if they are no neighbours."""
+        """Return the templates for these steps, and note them."""
         (radius_steps, x_steps, y_steps, _), (luma_steps, chroma_steps, box_px, shown) = steps, self._looks
         radius_px, bearing = view[RADIUS], (x_steps, y_steps)
         luma = Wanted(radius_steps, luma_steps, *bearing, 1, sampling_of(radius_px, 1), shown)
         chroma = Wanted(radius_steps, chroma_steps, *bearing, box_px, sampling_of(radius_px, box_px), shown)
         slots = (ball, 0), (ball, 1)
         pair = self._template(slots[0], luma, view, appearance), self._template(slots[1], chroma, view, appearance)
-        if self._serving[slots[0]][0] == luma and self._serving[slots[1]][0] == chroma:
-            self._as_wanted[ball] = steps, pair
+        as_wanted = self._serving[slots[0]][0] == luma and self._serving[slots[1]][0] == chroma
+        self._served[ball] = steps, pair, as_wanted
         return pair
 
     def _take_up(self, appearance: Appearance) -> None:
@@ -90,7 +90,7 @@ class Album:
         _, chroma_steps = steps_of(0.0, r.chroma_px)
         looks = luma_steps, chroma_steps, r.block_px, appearance.shown
         if looks != self._looks:
-            self._as_wanted.clear()
+            self._served.clear()
         self._appearance, self._looks, self._lit = appearance, looks, appearance.shown.count > 0
 
     def _template(
@@ -111,6 +111,7 @@ class Album:
             if len(self._drawn) >= KEPT:
                 self._drawn.pop(next(iter(self._drawn)))
             self._drawn[wanted] = template
+            self._served.clear()  # it may be what another ball waits for
         self._serving[slot] = wanted, template
         return template
 

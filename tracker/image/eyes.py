@@ -100,13 +100,18 @@ class Eyes:
 
     def look(self, frames: Sequence[Frame], state: State) -> Look:
         """Find each ball in each image where a state expects it."""
-        whose = frames[self._turn % len(frames)].camera  # of those that see now: free-running ones are a round each
+        whose = self._may_draw(frames)
         for index, album in enumerate(self._albums):
             album.draws_left = int(index == whose) if self._settled else None
         look = look_near(frames, self._rig, state, self._gazes)
         smear_px = self._smear_px(state)
         look.blind = smear_px > BLIND_PX
         return look.doubted(SMEAR_DOUBT * smear_px) if look.blind else look
+
+    def _may_draw(self, frames: Sequence[Frame]) -> int | None:
+        """Return the camera that may draw a template: each that sees now in turn, and none in a lesson's round."""
+        lessons, since = divmod(self._turn + 1, LEARN_EVERY)
+        return frames[(self._turn - lessons) % len(frames)].camera if since else None
 
     def blind(self, state: State) -> bool:
         """Say whether a state does not know how far the balls' images are smeared."""

@@ -152,7 +152,8 @@ def _linearise(pixels: Array, drawn: Array, tukey: Array, work: Array, squares: 
     weight, seen = work[m], np.empty((channels, pixels.shape[1]))
     for i in range(len(weight)):
         weight[i] = (tukey[i] * pixels[TRUST, i]) ** 2
-    factor, coefficients, T = np.empty((m, m)), np.empty((channels, m)), np.empty((2, m))
+    small = np.empty((m + channels + 2, m))  # in one piece: to ask for memory takes as long as to solve
+    factor, coefficients, T = small[:m], small[m : m + channels], small[m + channels :]
     squares[:] = 0.0
     normal[:] = 0.0
     without_room(pixels, drawn[m - PLANE], seen)

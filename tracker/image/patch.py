@@ -18,7 +18,7 @@ from tracker.image.whiten import (
     RED_SCALE,
     ROOM_SHARE,
     SCALES,
-    colour_of_block,
+    colour_at,
     luma_blue_red,
     whitening,
 )
@@ -238,8 +238,8 @@ def _detail(image: Image, u: int, v: int, half: int) -> float:
     squares = np.zeros(2)
     for row in range(v - half, v + half + 1):
         for column in range(u - half, u + half):
-            _, blue, red = colour_of_block(image, column, row, 1)
-            _, next_blue, next_red = colour_of_block(image, column + 1, row, 1)
+            _, blue, red = colour_at(image, column, row)
+            _, next_blue, next_red = colour_at(image, column + 1, row)
             squares[column % 2] += (blue - next_blue) ** 2 + (red - next_red) ** 2
     return float(squares[0] / max(squares[1], 1.0))
 

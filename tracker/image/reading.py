@@ -41,23 +41,23 @@ def _gather(
     size, shapes = len(fine), fine.shape[2]
     middle, flat, last = size // 2, fine.reshape(size * size * shapes), size - 2
     along, below = np.uint64(shapes), np.uint64(size * shapes)  # unsigned, so that no index is looked at for its sign
-    starts = np.empty(places.shape[1], np.uint64)
-    for i in range(pixels.shape[1]):
-        column, row = middle - u_steps + int(pixels[0, i] * per_px), middle - v_steps + int(pixels[1, i] * per_px)
-        for k in range(len(starts)):
-            c, r = min(max(column - places[0, k], 1), last), min(max(row - places[1, k], 1), last)
-            starts[k] = np.uint64((r * size + c) * shapes)
-        for p in range(shapes):
-            here = left = right = above = under = np.float32(0.0)
-            for k in range(len(starts)):
-                at = starts[k] + np.uint64(p)
-                here += flat[at]
-                left += flat[at - along]
-                right += flat[at + along]
-                above += flat[at - below]
-                under += flat[at + below]
-            sums[0, p, i], sums[1, p, i], sums[2, p, i] = here, left, right
-            sums[3, p, i], sums[4, p, i] = above, under
+    starts = np.empty(pixels.shape[1], np.uint64)
+    sums[:] = np.float32(0.0)
+    for k in range(places.shape[1]):
+        u_place, v_place = middle - u_steps - places[0, k], middle - v_steps - places[1, k]
+        for i in range(len(starts)):
+            column, row = u_place + int(pixels[0, i] * per_px), v_place + int(pixels[1, i] * per_px)
+            c, r = min(max(column, 1), last), min(max(row, 1), last)
+            starts[i] = np.uint64((r * size + c) * shapes)
+        for p in range(shapes):  # one after the other, so that many reads are under way at once
+            here, left, right, above, under = sums[0, p], sums[1, p], sums[2, p], sums[3, p], sums[4, p]
+            for i in range(len(starts)):
+                at = starts[i] + np.uint64(p)
+                here[i] += flat[at]
+                left[i] += flat[at - along]
+                right[i] += flat[at + along]
+                above[i] += flat[at - below]
+                under[i] += flat[at + below]
 
 
 @compiled(

@@ -22,8 +22,14 @@ def luma_blue_red(b: float, g: float, r: float) -> tuple[float, float, float]:
     return luma, 0.5 * b - 0.331264 * g - 0.168736 * r, -0.081312 * b - 0.418688 * g + 0.5 * r
 
 
+@compiled("UniTuple(f8, 3)(Array(uint8, 3, 'C', True), i8, i8)")
+def colour_at(image: Image, column: int, row: int) -> tuple[float, float, float]:
+    """Return the luma, blue and red difference of a pixel, in grey levels."""
+    return luma_blue_red(image[row, column, 0], image[row, column, 1], image[row, column, 2])
+
+
 @compiled("UniTuple(f8, 3)(Array(uint8, 3, 'C', True), i8, i8, i8)")
-def colour_of_block(image: Image, left: int, top: int, block: int) -> tuple[float, float, float]:
+def _colour_of_block(image: Image, left: int, top: int, block: int) -> tuple[float, float, float]:
     """Return the mean luma, blue and red difference of a block of pixels, in grey levels."""
     b = g = r = 0
     for v in range(top, top + block):
@@ -37,7 +43,7 @@ def colour_of_block(image: Image, left: int, top: int, block: int) -> tuple[floa
 
 @compiled("UniTuple(f8, 3)(Array(f4, 3, 'C'), i8, i8, i8)")
 def _colour_behind(room: NDArray[np.float32], left: int, top: int, block: int) -> tuple[float, float, float]:
-    """Return of the room's mean what `colour_of_block` does of an image."""
+    """Return of the room's mean what `_colour_of_block` does of an image."""
     b = g = r = 0.0
     for v in range(top, top + block):
         for u in range(left, left + block):
@@ -84,8 +90,10 @@ def _brightness(
             x, y = float(column - u), float(row - v)
             if (x - du) ** 2 + (y - dv) ** 2 <= beyond_px**2:
                 continue
-            luma, _, _ = colour_of_block(image, column, row, 1)
-            behind = _colour_behind(room, column, row, 1)[0] if known else 0.0
+            luma, _, _ = colour_at(image, column, row)
+            behind = 0.0
+            if known:
+                behind, _, _ = luma_blue_red(room[row, column, 0], room[row, column, 1], room[row, column, 2])
             _add_products(products, x, y, behind, luma)
     eliminate(products, 3)
     freedom, left = max(products[0, 0] - 3.0, 1.0), max(products[4, 4], 0.0)
@@ -115,7 +123,7 @@ def whitening(
             x, y = left + (block - 1) / 2 - u, top + (block - 1) / 2 - v
             if (x - du) ** 2 + (y - dv) ** 2 <= beyond_px**2:
                 continue
-            _, blue, red = colour_of_block(image, left, top, block)
+            _, blue, red = _colour_of_block(image, left, top, block)
             if helps:
                 _, blue_behind, red_behind = _colour_behind(room, left, top, block)
                 blue, red = blue - share * blue_behind, red - share * red_behind
