@@ -21,6 +21,7 @@ KNOWN, WELL_KNOWN, ENOUGH = 4, 8, 24  # looks from which a tile serves, and tell
 APART_NS = 250_000_000  # from look to look: a hand or a tube that stays for a moment is not the room
 MANY, SOME, FEW = 96, 8, 2  # tiles a round: not known yet; of those that would be known better; of all by turn
 NEARER = 4.0  # tiles further away that count as much as one look more
+SELDOM = 4  # a camera's rounds for one look, once all is known
 CHANGED_LEVELS = 12.0  # of the green channel, one sigma within a tile: no noise, something else stands there
 
 
@@ -43,19 +44,25 @@ class Behind:
         self.room = Room(np.zeros((height, width, 3), np.float32), np.zeros(tiles, np.uint8))
         self._looked_ns = np.full(tiles, -(2**62))
         self._next = np.zeros(1, np.int64)
-        self.eager = True  # whether the last look was at something not known yet
+        self._eager = True  # whether the last look was at something not known yet
+        self._turn = 0
+
+    def is_due(self) -> bool:
+        """Say whether to look in this round of the camera: in each while there is much to learn, then in some."""
+        self._turn += 1
+        return self._eager or self._turn % SELDOM == 0
 
     def learn(self, frame: Frame, middle_px: tuple[float, float], clear_px: float) -> None:
         """Learn some of what shows beside the vehicle, the nearest first: that is where it may fly next.
 
         middle_px: of the vehicle in the frame.  clear_px: how far round it the vehicle may hide the room.
         """
-        self.eager = _learn(frame.image, *self.room, *middle_px, clear_px, frame.t_ns, self._looked_ns, self._next)
+        self._eager = _learn(frame.image, *self.room, *middle_px, clear_px, frame.t_ns, self._looked_ns, self._next)
 
     def forget(self) -> None:
         """Start anew: the camera has moved."""
         self.room.looks[:] = 0
-        self.eager = True
+        self._eager = True
 
 
 @compiled("b1(Array(u1, 2, 'C'), i8, i8, i8, i8)")

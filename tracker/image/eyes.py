@@ -22,7 +22,7 @@ from tracker.types import Frame
 
 LIGHT_BALLS = 2  # a single ball that is something else would tell of a light that is not there
 LEARN_ALL = 108  # balls of each camera under its gamma; then
-LEARN_EVERY = 4  # rounds one ball
+LEARN_EVERY = 5  # rounds one ball: odd, for free-running cameras have rounds in turn
 BLIND_PX = 0.5  # of the streak's sigma: how fast the balls move is not known
 SMEAR_DOUBT = 0.1  # of an unknown smear: what it moves the centre of a shaded ball, one sigma
 LONG_STREAK_PX = 0.7  # an image smeared further than this, taken for a still one, teaches wrong
@@ -149,7 +149,7 @@ class Eyes:
         """Learn the room where the vehicle is not, by frames of about a state's time; once it is known, by some."""
         for frame in frames:
             behind = self._behind[frame.camera]
-            if not behind.eager and (self._turn + frame.camera) % LEARN_EVERY:
+            if not behind.is_due():
                 continue
             u, v, clear_px = whereabouts(state, self._rig, frame.camera)
             if math.isfinite(u) and math.isfinite(v):
