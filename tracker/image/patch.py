@@ -168,7 +168,7 @@ def _add_products(products: Array, x: float, y: float, a: float, b: float, count
 
 
 @compiled("void(Array(uint8, 3, 'C', True), i8, i8, i8, i8, f8, f8, f8, f8[::1])")
-def _whitening(
+def whitening(
     image: Image, u: int, v: int, half: int, block: int, du: float, dv: float, beyond_px: float, scale: Array
 ) -> None:
     """Find the scales of luma and of the two colour differences by the background's variation about a plane.
@@ -219,7 +219,7 @@ def cut_pixels(
     pixels = (2 * half + 1) ** 2
     bright, colour, scale, count = np.empty((4, pixels)), np.empty((5, pixels)), np.zeros(4), 0
     share = 1.0 / (block * block)
-    _whitening(image, u, v, half, block, du, dv, edge_px + RING_PX, scale)
+    whitening(image, u, v, half, block, du, dv, edge_px + RING_PX, scale)
     for top in range(v - half + ((v - half) % block), v + half - block + 2, block):
         for left in range(u - half + ((u - half) % block), u + half - block + 2, block):
             x, y = left + (block - 1) / 2 - u, top + (block - 1) / 2 - v

@@ -120,3 +120,8 @@ def _rivals(appearances: Iterable[Appearance], pull_px: Array) -> Rivals:
 def first_rivals() -> Rivals:
     """Return the rivals before anything was seen."""
     return _rivals((Appearance(Response(gamma=gamma)) for gamma in GAMMAS), np.zeros(2))
+
+
+def settled_on(appearance: Appearance) -> Rivals:
+    """Return one appearance whose gamma is known."""
+    return _rivals([appearance], np.zeros(2))
