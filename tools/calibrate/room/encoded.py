@@ -29,7 +29,8 @@ BRIGHT, GLOSS, PLANES, U, V, OWN = 0, 1, 2, 11, 12, 13
 """Unknowns of one sighting: s, g, nine k, channel by channel, and the centre from the patch's middle pixel [px]."""
 GAMMA, BLUR, PAINT, ALL = 13, 14, 15, 18
 """Those that sightings share: gamma, the variance of the blur [px^2], and the paint's three."""
-SHAPES = 3
+SHARED = ALL - OWN
+SHAPES = 3  # of a template whose light is known
 TERMS = SHAPES + PLANE
 ROUNDS = 4  # the first from a rough guess, without leaving pixels out
 MOST_STEP_PX = 0.5
@@ -236,8 +237,8 @@ def fit_encoded(
         gamma, smoothing, paint (3,): of the camera, see `encoding.Encoding`.  light_of (256,): of each grey level.
         own (OWN,): its centre to begin with; all filled in.
         covariance (2, 2): of the centre, filled in.
-        shared: none, or (6, 6): lower triangle of the products of GAMMA, BLUR, three PAINT and what is left, without
-            what is the sighting's own, filled in.
+        shared: none, or (SHARED + 1, SHARED + 1): lower triangle of the products of what is shared and of what is left,
+            without what is the sighting's own, filled in.
     Returns:
         chi2 per degree of freedom of its brightness.
     Source: Gauss-Newton, (1) encoded; the unknowns shared are for `gamma.learned`.

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tools.calibrate.room.encoded import OWN, U, V, fit_encoded
+from tools.calibrate.room.encoded import OWN, SHAPES, U, V, fit_encoded
 from tracker.image.appearance import MISFIT_MAX, Appearance
 from tracker.image.centre import Centre, numbers_of
 from tracker.image.holder import without_holder
@@ -92,7 +92,11 @@ def fitted(
         shared: see `fit_encoded`.
     Returns:
         Its centre, with chi2 of its brightness alone; None where nothing fits.
+    Raises:
+        ValueError: the ball's light is not known.
     """
+    if len(ball.shades.weights) != SHAPES:  # the compiled fit checks no index
+        raise ValueError(f"a ball of {len(ball.shades.weights)} shapes: must be {SHAPES}; learn its light first")
     square = square_of(image, ball, held_px)
     if square is None:
         return None

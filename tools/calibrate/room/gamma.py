@@ -6,11 +6,13 @@ Sightings whose own unknowns are eliminated leave normal equations of what they 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from tools.calibrate.room.again import Again
+from tools.calibrate.room.encoded import SHARED
 from tools.calibrate.room.encoding import Encoding, fitted
 from tracker.image.appearance import MISFIT_MAX
 from tracker.image.centre import Centre, fit_centre
@@ -23,7 +25,8 @@ SMOOTHED = 1.0 / 8.0
 """Of a block's colour, what it has of either neighbour where a decoder draws colour between the blocks by 3 to 1."""
 SMOOTH_DETAIL = 0.1  # of `Response.detail`: without smoothing all of a block has one colour
 STEPS, SIGHTINGS = 3, 120  # of Gauss-Newton, each by about so many
-LEAST_GAMMA, MOST_GAMMA, MOST_STEP, MOST_STEP_PX2 = 1.0, 3.0, 0.5, 0.1
+LEAST_GAMMA, MOST_GAMMA = 0.5, 3.0  # below 1 no camera is; told there, gamma makes up for what the model lacks
+MOST_STEP, MOST_STEP_PX2 = 0.5, 0.1
 ALIKE, FURTHER = 0.02, 3.0  # a gamma told again; how much further than told the second is tried
 ENOUGH = 30  # sightings
 LEAST_PAINT, RIDGE = 1e-3, 1e-6
@@ -98,29 +101,32 @@ def _first_paints(camera: Again, rivals: Rivals) -> Array:
 
 def _step(camera: Again, known: Encoding) -> Array | None:
     """Return the step (2 + 3 balls,) of gamma, blur and paints to where all sightings fit better; None for too few."""
-    balls = len(camera.rig.marker)
-    size, count = 2 + 3 * balls, 0
+    size, count = 2 + known.paints.size, 0
     N, g = np.zeros((size, size)), np.zeros(size)
-    rivals = settled_on(known.appearance)
-    for k in _sightings(camera):
-        image, held_px = camera.image(k), camera.held_px(k)
-        for ball in range(balls):
-            expected, shared = camera.expected(rivals, k, ball), np.zeros((6, 6))
-            found = fit_centre(image, expected, held_px)
-            if not isinstance(found, Centre) or found.misfit > MISFIT_MAX:
-                continue
-            expected = replace(expected, uv_px=(float(found.uv_px[0]), float(found.uv_px[1])))
-            if fitted(image, expected, held_px, known, ball, shared) is None:
-                continue
-            at = [0, 1, *range(2 + 3 * ball, 5 + 3 * ball)]
-            whole = np.tril(shared) + np.tril(shared, -1).T
-            N[np.ix_(at, at)] += whole[:5, :5]
-            g[at] += whole[5, :5]
-            count += 1
+    for ball, products in _told_by_each(camera, known):
+        at = [0, 1, *range(2 + 3 * ball, 5 + 3 * ball)]
+        N[np.ix_(at, at)] += products[:-1, :-1]
+        g[at] += products[-1, :-1]
+        count += 1
     if count < ENOUGH:
         return None
     N[np.diag_indices(size)] *= 1.0 + RIDGE  # brightness and paint go together
     return np.asarray(np.linalg.lstsq(N, g)[0])
+
+
+def _told_by_each(camera: Again, known: Encoding) -> Iterator[tuple[int, Array]]:
+    """Yield of each sighting which ball it is of, and its products of what is shared, see `fit_encoded`."""
+    rivals = settled_on(known.appearance)
+    for k in _sightings(camera):
+        image, held_px = camera.image(k), camera.held_px(k)
+        for ball in range(len(known.paints)):
+            expected, shared = camera.expected(rivals, k, ball), np.zeros((SHARED + 1, SHARED + 1))
+            found = fit_centre(image, expected, held_px)
+            if not isinstance(found, Centre) or found.misfit > MISFIT_MAX:
+                continue
+            there = replace(expected, uv_px=(float(found.uv_px[0]), float(found.uv_px[1])))
+            if fitted(image, there, held_px, known, ball, shared) is not None:
+                yield ball, np.tril(shared) + np.tril(shared, -1).T
 
 
 def _stepped(known: Encoding, step: Array) -> Encoding:
