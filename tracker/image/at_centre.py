@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.image.newton import draw_at, fit_linear, residual, rows_of, slope_of
-from tracker.image.patch import PLANE, TRUST, channels_of, without_room
+from tracker.image.patch import LUMA, PLANE, TRUST, channels_of, without_room
 from tracker.maths.compiled import compiled
 from tracker.types import Array
 
@@ -44,11 +44,12 @@ def slopes_at(
     for channel in range(channels):
         c = coefficients[channel]
         residual(drawn[:m], c, seen[channel], rest)
-        slope_of(pixels, channel, drawn[m + 2 * p :], c, bend)
+        slope_of(pixels, pixels[LUMA + channels + channel], drawn[m + 2 * p :], c, bend)
         for i in range(n):
             total -= weight[i] * rest[i] * bend[i]
-    slope_of(pixels, 0, drawn[m : m + p], coefficients[0], slopes[0])
-    slope_of(pixels, 0, drawn[m + p : m + 2 * p], coefficients[0], slopes[1])
+    room = pixels[LUMA + channels]
+    slope_of(pixels, room, drawn[m : m + p], coefficients[0], slopes[0])
+    slope_of(pixels, room, drawn[m + p : m + 2 * p], coefficients[0], slopes[1])
     return total
 
 

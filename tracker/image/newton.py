@@ -83,13 +83,14 @@ def residual(model: Array, c: Array, seen: Array, rest: Array) -> None:
             rest[i] -= c[j] * model[j, i]
 
 
-@compiled("void(f8[:, ::1], i8, f8[:, ::1], f8[::1], f8[::1])")
-def slope_of(pixels: Array, channel: int, by: Array, c: Array, slope: Array) -> None:
+@compiled("void(f8[:, ::1], f8[::1], f8[:, ::1], f8[::1], f8[::1])")
+def slope_of(pixels: Array, room: Array, by: Array, c: Array, slope: Array) -> None:
     """Fill in the slope (n,) of one channel's model with coefficients c (m,), from the shapes' slopes (p, n).
 
-    The background's rows are (1 - coverage) (1, x, y), as the known room's is; their slopes are minus the coverage's.
+    The background's rows are (1 - coverage) (1, x, y), as the known room's (n,) is; their slopes are minus the
+    coverage's.
     """
-    p, room = len(by), pixels[LUMA + channels_of(pixels) + channel]
+    p = len(by)
     for i in range(len(slope)):
         slope[i] = (c[0] - c[p] - c[p + 1] * pixels[X, i] - c[p + 2] * pixels[Y, i] - room[i]) * by[0, i]
     for j in range(1, p):
@@ -117,8 +118,9 @@ def _add_channel(
     m, rest, slope_u, slope_v = len(c), rows[0], rows[1], rows[2]
     p = m - PLANE
     residual(drawn[:m], c, seen, rest)
-    slope_of(pixels, channel, drawn[m : m + p], c, slope_u)
-    slope_of(pixels, channel, drawn[m + p : m + 2 * p], c, slope_v)
+    room = pixels[LUMA + channels_of(pixels) + channel]
+    slope_of(pixels, room, drawn[m : m + p], c, slope_u)
+    slope_of(pixels, room, drawn[m + p : m + 2 * p], c, slope_v)
     uu = uv = vv = ur = vr = 0.0
     for i in range(len(weight)):
         u, v = weight[i] * slope_u[i], weight[i] * slope_v[i]

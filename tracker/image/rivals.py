@@ -139,3 +139,8 @@ def _around(best: Appearance, apart: float, pull_px: Array, *, by_room: bool) ->
 def first_rivals() -> Rivals:
     """Return the rivals before anything was seen."""
     return Rivals(tuple(Appearance(Response(gamma=gamma)) for gamma in GAMMAS), (0.0,) * len(GAMMAS), 0, np.zeros(2))
+
+
+def settled_on(appearance: Appearance) -> Rivals:
+    """Return one appearance whose gamma is known."""
+    return Rivals((appearance,), (0.0,), 0, np.zeros(2))

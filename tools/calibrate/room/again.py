@@ -6,25 +6,24 @@ which turns cameras and stretches rooms. The tracker itself would do, but its ga
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from tools.calibrate.room.balls import sigma_px
 from tools.calibrate.room.footage import Clip, Footage
 from tools.calibrate.room.start import triangulated_from
 from tools.calibrate.room.tracks import Track, track_of
+from tracker.image.appearance import Appearance
 from tracker.image.centre import Centre, fit_centre
 from tracker.image.patch import Expected
-from tracker.image.rivals import Rivals, first_rivals
+from tracker.image.rivals import Rivals, first_rivals, settled_on
 from tracker.rig import Rig
 from tracker.types import Array, Image
 
 LESSONS, SWEEPS = 240, 6
 """Images of each camera to learn from, and in how many sweeps over the footage: what was learned last counts most, and
 must not be where the marker happened to end."""
-DOUBT = 3.0  # times the sigma of the first look
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,7 +52,13 @@ class Again:
 
     def taught(self) -> Rivals:
         """Learn how this camera shows balls."""
-        rivals, lessons = first_rivals(), self.lessons()
+        return self._learned(first_rivals(), self.lessons())
+
+    def taught_anew(self, known: Appearance) -> Appearance:
+        """Learn light anew under a gamma that is known; half of the images do for that."""
+        return self._learned(settled_on(known), self.lessons()[::2]).best
+
+    def _learned(self, rivals: Rivals, lessons: Sequence[int]) -> Rivals:
         for k in (k for sweep in range(SWEEPS) for k in lessons[sweep::SWEEPS]):
             image = self.image(k)
             for ball in range(len(self.rig.marker)):
@@ -62,13 +67,6 @@ class Again:
                 if isinstance(found, Centre):
                     rivals = rivals.learned(image, self.rig.cameras[self.camera], expected, found)
         return rivals
-
-    def measured(self) -> Iterator[tuple[float, Array]]:
-        """Yield the stamps and centres of its images, fitted once it is known how it shows balls."""
-        rivals = self.taught()
-        for k in self.known():
-            image, balls = self.image(k), range(len(self.rig.marker))
-            yield float(self.t_s[k]), np.stack([self._refitted(image, rivals, k, ball) for ball in balls])
 
     def expected(self, rivals: Rivals, k: int, ball: int) -> Expected:
         """Return what is expected of a ball in an image."""
@@ -95,13 +93,6 @@ class Again:
         u, v, _ = self.clips[k].centres_px.mean(axis=0).tolist()
         return u, v
 
-    def _refitted(self, image: Image, rivals: Rivals, k: int, ball: int) -> Array:
-        """Return a ball's centre and one sigma (3,) [px]; that of the first look, believed less, where none fits."""
-        fit = fit_centre(image, self.expected(rivals, k, ball), self.held_px(k))
-        if isinstance(fit, Centre):
-            return np.append(fit.uv_px, sigma_px(fit))
-        return np.asarray(self.clips[k].centres_px[ball] * (1.0, 1.0, DOUBT))
-
 
 def again(footage: Footage, rig: Rig) -> tuple[Again, ...]:
     """Return each camera's images once more.
@@ -120,17 +111,6 @@ def again(footage: Footage, rig: Rig) -> tuple[Again, ...]:
         Again(rig, c, each, of, _views(tracks, of, c, rig))
         for c, (each, of) in enumerate(zip(clips, times, strict=True))
     )
-
-
-def looked_again(footage: Footage, rig: Rig) -> tuple[Track, ...]:
-    """Fit every ball's image again, in two passes: one to learn how each camera shows balls, one to measure.
-
-    Args:
-        footage, rig: see `again`.
-    Returns:
-        Each camera's track of what two cameras saw together; times count from footage.start_ns by the rig's clocks.
-    """
-    return tuple(track_of(each.measured(), len(rig.marker)) for each in again(footage, rig))
 
 
 def _times_s(clips: Sequence[Clip], rig: Rig, start_ns: int) -> Array:

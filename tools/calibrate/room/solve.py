@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tools.calibrate.room.again import looked_again
 from tools.calibrate.room.bundle import Adjusted, adjust
+from tools.calibrate.room.centres import looked_again
 from tools.calibrate.room.footage import Footage
 from tools.calibrate.room.gauge import aligned
 from tools.calibrate.room.jacobian import Layout

@@ -48,7 +48,14 @@ def _scene(rig: Rig, instants: int, rng: np.random.Generator) -> tuple[Scene, Se
 
 @pytest.mark.parametrize(
     ("cameras", "seed", "look"),
-    [(2, 1, Look()), (2, 5, Look()), (2, 6, Look(jpeg_quality=90)), (3, 2, Look()), (4, 1, Look(jpeg_quality=90))],
+    [
+        (2, 1, Look()),
+        (2, 5, Look()),
+        (2, 6, Look(jpeg_quality=90)),
+        (2, 1, Look(jpeg_quality=75)),
+        (3, 2, Look()),
+        (4, 1, Look(jpeg_quality=90)),
+    ],
 )
 def test_misplaced_cameras_are_found_again_within_what_is_said_of_them_and_so_are_their_clocks(
     cameras: int, seed: int, look: Look
