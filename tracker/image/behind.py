@@ -19,7 +19,7 @@ from tracker.types import Frame, Image
 TILE_PX = 16
 KNOWN, WELL_KNOWN, ENOUGH = 4, 8, 24  # looks from which a tile serves, and tells gamma; the most that its mean is of
 APART_NS = 250_000_000  # from look to look: a hand or a tube that stays for a moment is not the room
-MANY, SOME, FEW = 96, 8, 2  # tiles a round: not known yet; of those that would be known better; of all by turn
+MANY, SOME, FEW = 96, 8, 16  # tiles a round: not known yet; of those that would be known better; of all by turn
 NEARER = 4.0  # tiles further away that count as much as one look more
 SELDOM = 4  # a camera's rounds for one look, once all is known
 CHANGED_LEVELS = 12.0  # of the green channel, one sigma within a tile: no noise, something else stands there

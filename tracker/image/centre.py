@@ -1,10 +1,11 @@
 """Sub-pixel centres of balls, by fitting their images.
 
 A pixel near the edge shows part ball, part room. Which part is unknown where the ball is dark and so is the room, so
-the whole patch is fitted at once: coverage times a shaded ball, the rest times a sloping background; brightness and
-the two colour differences apart, because cameras blur colour more (Bayer filters, JPEG 4:2:0). The linear coefficients
-are solved for inside (variable projection), the centre by Gauss-Newton, and pixels that fit no ball (tubes, writing)
-lose their weight (Tukey's biweight): `tracker/image/newton.py`.
+the whole patch is fitted at once: coverage times a shaded ball, the rest times a sloping background and, where it is
+known, the room behind (`tracker/image/behind.py`); brightness and the two colour differences apart, because cameras
+blur colour more (Bayer filters, JPEG 4:2:0). The linear coefficients are solved for inside (variable projection), the
+centre by Gauss-Newton, and pixels that fit no ball (tubes, writing) lose their weight (Tukey's biweight):
+`tracker/image/newton.py`.
 """
 
 from __future__ import annotations
