@@ -74,9 +74,9 @@ def _add_products(products: Array, x: float, y: float, a: float, b: float) -> No
     products[4, 4] += b * b
 
 
-@compiled("UniTuple(f8, 2)(Array(uint8, 3, 'C', True), Array(f4, 3, 'C'), b1, i8, i8, i8, f8, f8, f8)")
+@compiled("UniTuple(f8, 2)(Array(uint8, 3, 'C', True), Array(f4, 3, 'C'), b1, i8, i8, i8, i8, f8, f8, f8)")
 def _brightness(
-    image: Image, room: NDArray[np.float32], known: bool, u: int, v: int, half: int, du: float, dv: float,
+    image: Image, room: NDArray[np.float32], known: bool, u: int, v: int, half: int, block: int, du: float, dv: float,
     beyond_px: float,
 ) -> tuple[float, float]:  # fmt: skip
     """Return the variance of luma about a plane and the room, and how strongly that shows: 0 if it is no help.
@@ -85,25 +85,27 @@ def _brightness(
         in part; least squares then finds a share below 1, which is what takes out most.
     """
     products = np.zeros((5, 5))
-    for row in range(v - half, v + half + 1):
-        for column in range(u - half, u + half + 1):
-            x, y = float(column - u), float(row - v)
+    for top in range(v - half + ((v - half) % block), v + half - block + 2, block):
+        for left in range(u - half + ((u - half) % block), u + half - block + 2, block):
+            x, y = left + (block - 1) / 2 - u, top + (block - 1) / 2 - v
             if (x - du) ** 2 + (y - dv) ** 2 <= beyond_px**2:
                 continue
-            luma, _, _ = colour_at(image, column, row)
-            behind = 0.0
-            if known:
-                behind, _, _ = luma_blue_red(room[row, column, 0], room[row, column, 1], room[row, column, 2])
-            _add_products(products, x, y, behind, luma)
+            for row in range(top, top + block):
+                for column in range(left, left + block):
+                    luma, _, _ = colour_at(image, column, row)
+                    behind = 0.0
+                    if known:
+                        behind, _, _ = luma_blue_red(room[row, column, 0], room[row, column, 1], room[row, column, 2])
+                    _add_products(products, float(column - u), float(row - v), behind, luma)
     eliminate(products, 3)
-    freedom, left = max(products[0, 0] - 3.0, 1.0), max(products[4, 4], 0.0)
+    freedom, plain = max(products[0, 0] - 3.0, 1.0), max(products[4, 4], 0.0)
     if known:
-        own = UNSURE * left / freedom
+        own = UNSURE * plain / freedom
         share = (products[4, 3] + own) / (products[3, 3] + own + LEAST_NOISE**2)
-        with_room = left - 2.0 * share * products[4, 3] + share * share * products[3, 3]
-        if with_room < left:
+        with_room = plain - 2.0 * share * products[4, 3] + share * share * products[3, 3]
+        if with_room < plain:
             return max(with_room, 0.0) / freedom, share
-    return left / freedom, 0.0
+    return plain / freedom, 0.0
 
 
 @compiled("void(Array(uint8, 3, 'C', True), Array(f4, 3, 'C'), b1, i8, i8, i8, i8, f8, f8, f8, f8[::1])")
@@ -116,7 +118,7 @@ def whitening(
     That is the variation about a plane and, where it is known, the room. Luma varies by pixel, colour by block; colour
     is made white by Cholesky's factor.
     """
-    variance, share = _brightness(image, room, known, u, v, half, du, dv, beyond_px)
+    variance, share = _brightness(image, room, known, u, v, half, block, du, dv, beyond_px)
     products, helps = np.zeros((5, 5)), share > 0.0
     for top in range(v - half + ((v - half) % block), v + half - block + 2, block):
         for left in range(u - half + ((u - half) % block), u + half - block + 2, block):
