@@ -28,7 +28,6 @@ SEARCHING, FOUND, FOUND_BY_ROOM, AT_THE_END = 0.3, 0.15, 0.08, 0.04
 """One sigma of a gamma: of the best rival, of one that three told, the same by balls behind which the room is known,
 and of 1, where the range ends."""
 ROUND_BALLS, LONG_ROUND_BALLS = 54, 90  # balls that a set of rivals learns from before it is judged: the long round
-TOLD = 18  # balls from which a search begun anew is believed more than what was found before
 CLEAR = 0.25  # where their misfits' logarithms differ by less than this; by chance it is about 0.05
 FIRST_LESSONS, FIRST_BALLS = 4, 12
 FORGETTING = 0.94  # a ball: what the light was when it was still being learned counts little
@@ -63,9 +62,7 @@ class Rivals:
 
     @property
     def best(self) -> Appearance:
-        """Return the appearance that fits best; in a search just begun anew, that of the gamma found before."""
-        if self.by_room and not self.settled and self.count < TOLD:
-            return self.appearances[1]
+        """Return the appearance that fits best."""
         return self.appearances[self.misfits.index(min(self.misfits))]
 
     @property
