@@ -100,7 +100,7 @@ class Study:
         if isinstance(found, Update) and too_lonely(found.used, looking, len(self._rig.marker)):
             detail = f"camera {found.used[0].camera} shows {len(found.used)} of the balls, and no other one any"
             found = Rejected(Reason.ALONE, detail, ahead.state.t_ns)
-        if isinstance(found, Update) and self._quarrel.accused(sightings, found.used):
+        if isinstance(found, Update) and self._quarrel.is_new(sightings, found.used):
             detail = "two cameras contradict each other, and neither is believed yet"
             found = Rejected(Reason.FRAME_GATE, detail, ahead.state.t_ns)
         if isinstance(found, Update) and last is None and not self._all_seen_twice(found):

@@ -58,21 +58,21 @@ class Quarrel:
         self._accused: int | None = None
         self._since_ns = 0
 
-    def accused(self, seen: Sequence[BallSighting], used: Sequence[BallSighting]) -> tuple[BallSighting, ...]:
-        """Return the sightings of the camera that a single other one left out, for the first time; none otherwise.
+    def is_new(self, seen: Sequence[BallSighting], used: Sequence[BallSighting]) -> bool:
+        """Say whether a single camera leaves out another one that was not left out before.
 
         seen: sightings of one instant.  used: those of them that the update believes.
         """
         believed = {sighting.camera for sighting in used}
-        against = tuple(sighting for sighting in seen if sighting.camera not in believed)
+        against = [sighting for sighting in seen if sighting.camera not in believed]
         if len(believed) > 1:
             self._accused = None
         if len(believed) > 1 or len(against) < WITNESSES:
-            return ()
+            return False
         camera, _, t_ns, *_ = against[0]
         if self._accused != camera:
             self._accused, self._since_ns = camera, t_ns
-        return against if t_ns <= self._since_ns else ()
+        return t_ns <= self._since_ns  # the same images may be looked at again
 
 
 def _denied(ball: int, seen: Mapping[int, Collection[int]]) -> bool:

@@ -79,15 +79,14 @@ class Rivals:
         """Return the rivals after one more ball; arguments as for `Appearance.learned`."""
         if found.misfit > MISFIT_MAX:
             return self
-        known = behind_is_known(ball)
-        if self.settled and known and not self.by_room:
+        if self.settled and not self.by_room and behind_is_known(ball):
             return _around(self.best, APART, self.pull_px, by_room=True).learned(image, camera, ball, found)
         if self.settled:
             if ball.response.gamma != self.best.response.gamma:
                 return self  # looked at before this gamma was found
             one = self.best.learned(image, camera, ball, found)
             return replace(self, appearances=(one,), count=self.count + 1)
-        if self.by_room and not known:
+        if self.by_room and not behind_is_known(ball):
             return self
         appearances, misfits, centres = [], [], []
         share = max(1.0 - FORGETTING, 1.0 / (self.count + 1))

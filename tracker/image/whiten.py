@@ -28,30 +28,19 @@ def colour_at(image: Image, column: int, row: int) -> tuple[float, float, float]
     return luma_blue_red(image[row, column, 0], image[row, column, 1], image[row, column, 2])
 
 
-@compiled("UniTuple(f8, 3)(Array(uint8, 3, 'C', True), i8, i8, i8)")
-def _colour_of_block(image: Image, left: int, top: int, block: int) -> tuple[float, float, float]:
-    """Return the mean luma, blue and red difference of a block of pixels, in grey levels."""
-    b = g = r = 0
-    for v in range(top, top + block):
-        for u in range(left, left + block):
-            b += image[v, u, 0]
-            g += image[v, u, 1]
-            r += image[v, u, 2]
-    share = 1.0 / (block * block)
-    return luma_blue_red(share * b, share * g, share * r)
-
-
-@compiled("UniTuple(f8, 3)(Array(f4, 3, 'C'), i8, i8, i8)")
-def _colour_behind(room: NDArray[np.float32], left: int, top: int, block: int) -> tuple[float, float, float]:
-    """Return of the room's mean what `_colour_of_block` does of an image."""
+@compiled("UniTuple(f8, 3)(Array(uint8, 3, 'C', True), Array(f4, 3, 'C'), f8, i8, i8, i8)")
+def _colour_of_block(
+    image: Image, room: NDArray[np.float32], share: float, left: int, top: int, block: int
+) -> tuple[float, float, float]:
+    """Return the mean luma, blue and red difference of a block of pixels less a share of the room's, in grey levels."""
     b = g = r = 0.0
     for v in range(top, top + block):
         for u in range(left, left + block):
-            b += room[v, u, 0]
-            g += room[v, u, 1]
-            r += room[v, u, 2]
-    share = 1.0 / (block * block)
-    return luma_blue_red(share * b, share * g, share * r)
+            b, g, r = b + image[v, u, 0], g + image[v, u, 1], r + image[v, u, 2]
+            if share > 0.0:
+                b, g, r = b - share * room[v, u, 0], g - share * room[v, u, 1], r - share * room[v, u, 2]
+    per = 1.0 / (block * block)
+    return luma_blue_red(per * b, per * g, per * r)
 
 
 @compiled("void(f8[:, ::1], f8, f8, f8, f8)")
@@ -119,16 +108,13 @@ def whitening(
     is made white by Cholesky's factor.
     """
     variance, share = _brightness(image, room, known, u, v, half, block, du, dv, beyond_px)
-    products, helps = np.zeros((5, 5)), share > 0.0
+    products = np.zeros((5, 5))
     for top in range(v - half + ((v - half) % block), v + half - block + 2, block):
         for left in range(u - half + ((u - half) % block), u + half - block + 2, block):
             x, y = left + (block - 1) / 2 - u, top + (block - 1) / 2 - v
             if (x - du) ** 2 + (y - dv) ** 2 <= beyond_px**2:
                 continue
-            _, blue, red = _colour_of_block(image, left, top, block)
-            if helps:
-                _, blue_behind, red_behind = _colour_behind(room, left, top, block)
-                blue, red = blue - share * blue_behind, red - share * red_behind
+            _, blue, red = _colour_of_block(image, room, share, left, top, block)
             _add_products(products, x, y, blue, red)
     eliminate(products, 3)
     least, freedom = LEAST_NOISE**2, max(products[0, 0] - 3.0, 1.0)

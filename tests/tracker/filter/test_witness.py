@@ -77,21 +77,21 @@ def test_some_balls_in_one_camera_are_no_pose_while_another_sees_none(
 def test_of_two_cameras_that_contradict_each_other_none_is_believed_the_first_time() -> None:
     quarrel = Quarrel()
     first, second = (seen(*ALL_TWICE, t_ns=t_ns) for t_ns in (0, 66_000_000))
-    assert quarrel.accused(first, first[:3]) == tuple(first[3:])
-    assert quarrel.accused(first, first[:3]) == tuple(first[3:])  # the same images looked at again
-    assert quarrel.accused(second, second[:3]) == ()
+    assert quarrel.is_new(first, first[:3])
+    assert quarrel.is_new(first, first[:3])  # the same images looked at again
+    assert not quarrel.is_new(second, second[:3])
 
 
 def test_cameras_that_agree_again_or_change_sides_begin_another_quarrel() -> None:
     quarrel = Quarrel()
     first, second, third, fourth = (seen(*ALL_TWICE, t_ns=k * 66_000_000) for k in range(4))
-    assert quarrel.accused(first, first[:3]) != ()
-    assert quarrel.accused(second, second) == ()
-    assert quarrel.accused(third, third[:3]) != ()
-    assert quarrel.accused(fourth, fourth[3:]) == tuple(fourth[:3])
+    assert quarrel.is_new(first, first[:3])
+    assert not quarrel.is_new(second, second)
+    assert quarrel.is_new(third, third[:3])
+    assert quarrel.is_new(fourth, fourth[3:])
 
 
 def test_one_ball_left_out_and_a_camera_that_two_others_leave_out_are_no_quarrel() -> None:
     one_ball, outvoted = seen((0, 0), (0, 1), (0, 2), (1, 2)), seen(*ALL_TWICE, (2, 0), (2, 1))
-    assert Quarrel().accused(one_ball, one_ball[:3]) == ()
-    assert Quarrel().accused(outvoted, outvoted[:6]) == ()
+    assert not Quarrel().is_new(one_ball, one_ball[:3])
+    assert not Quarrel().is_new(outvoted, outvoted[:6])

@@ -21,7 +21,7 @@ from tracker.image.newton import LEAST_MISFIT, LEAST_WEIGHT, TUKEY, draw_at, row
 from tracker.image.patch import DARKEST, PLANE, WHITE
 from tracker.image.reading import LUMA_VAR
 from tracker.image.robust import MEDIANS
-from tracker.image.whiten import BLUE_SCALE, LUMA_SCALE, RED_BY_BLUE, RED_SCALE
+from tracker.image.whiten import BLUE_SCALE, LUMA_SCALE, RED_BY_BLUE, RED_SCALE, luma_blue_red
 from tracker.maths.compiled import compiled
 from tracker.maths.solve import cholesky, dot, eliminate, solve
 from tracker.types import Array, Image
@@ -37,7 +37,6 @@ ROUNDS = 4  # the first from a rough guess, without leaving pixels out
 MOST_STEP_PX = 0.5
 RIDGE = 1e-7
 INSIDE, OUTSIDE = 0.99, 0.01  # coverage
-TO_YCC = np.array(((0.114, 0.587, 0.299), (0.5, -0.331264, -0.168736), (-0.081312, -0.418688, 0.5)))
 
 
 @compiled("void(f8[:, ::1], f8, f8[:, ::1], f8[:, ::1])")
@@ -84,15 +83,12 @@ def shown(channels: Array, side: int, smoothing: float, scale: Array, bright: Ar
     scale (SCALES,): of `whiten.whitening`.
     """
     n, blocks = channels.shape[1], side * side
-    plane, work = np.empty(n), np.empty(blocks)
-    for of in range(3):
-        for i in range(n):
-            plane[i] = TO_YCC[of, 0] * channels[0, i] + TO_YCC[of, 1] * channels[1, i] + TO_YCC[of, 2] * channels[2, i]
-        if of == 0:
-            for i in range(n):
-                bright[i] = scale[LUMA_SCALE] * plane[i]
-        else:
-            average(plane, side, smoothing, work, colour[(of - 1) * blocks : of * blocks])
+    blue, red, work = np.empty(n), np.empty(n), np.empty(blocks)
+    for i in range(n):
+        luma, blue[i], red[i] = luma_blue_red(channels[0, i], channels[1, i], channels[2, i])
+        bright[i] = scale[LUMA_SCALE] * luma
+    average(blue, side, smoothing, work, colour[:blocks])
+    average(red, side, smoothing, work, colour[blocks:])
     for k in range(blocks):
         colour[blocks + k] = scale[RED_SCALE] * colour[blocks + k] - scale[RED_BY_BLUE] * colour[k]
         colour[k] *= scale[BLUE_SCALE]

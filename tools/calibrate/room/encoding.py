@@ -12,16 +12,7 @@ from tracker.image.appearance import MISFIT_MAX, Appearance
 from tracker.image.behind import NO_ROOM
 from tracker.image.centre import Centre, numbers_of
 from tracker.image.holder import without_holder
-from tracker.image.patch import (
-    CLIPPED,
-    CLIPPED_TRUST,
-    RING_PX,
-    TRUST,
-    Expected,
-    Patch,
-    extent_of,
-    light_of,
-)
+from tracker.image.patch import CLIPPED, CLIPPED_TRUST, RING_PX, TRUST, Expected, Patch, extent_of, light_of
 from tracker.image.template import MARGIN_PX, template_for
 from tracker.image.whiten import SCALES, whitening
 from tracker.types import Array, Image, frozen_array
