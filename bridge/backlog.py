@@ -23,7 +23,8 @@ class Backlog:
         self._batch = max(1, min(BATCH, capacity // 2))  # the loop goes on filling it meanwhile
         self._waiting: deque[Entry] = deque()
         self._wake = threading.Event()
-        self._room = threading.Event()
+        self._room = threading.Event()  # not set while somebody waits for it
+        self._room.set()
         self._closed = False
 
     def __len__(self) -> int:
@@ -62,7 +63,7 @@ class Backlog:
             closed = self._closed  # before the last look: what was put before the closing is taken
             while self._waiting:
                 entry = self._waiting.popleft()
-                if len(self._waiting) <= self._capacity // 2:
+                if not self._room.is_set() and len(self._waiting) <= self._capacity // 2:
                     self._room.set()
                 yield entry
             if closed:

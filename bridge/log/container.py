@@ -76,6 +76,7 @@ class Container:
         self._chunks: list[ChunkIndex] = []
         self._attachments: list[AttachmentIndex] = []
         self._metadata: list[MetadataIndex] = []
+        self._sequences = [0]  # of the next message by channel; their numbers begin at 1
         self._counts: Counter[int] = Counter()
         stream.write(MCAP0_MAGIC + _bytes_of(Header("", LIBRARY_IDENTIFIER)))
 
@@ -87,13 +88,16 @@ class Container:
         channel = Channel(len(self._channels) + 1, topic, message_encoding, {}, schema.id)
         self._schemas.append(schema)
         self._channels.append(channel)
+        self._sequences.append(0)
         self._chunk.add(_bytes_of(schema) + _bytes_of(channel))
         return channel.id
 
-    def add_message(self, channel: int, sequence: int, log_ns: int, publish_ns: int, data: bytes) -> None:
-        """Append a message [ns]."""
-        chunk = self._chunk
-        size = len(data)
+    def add_message(self, channel: int, log_ns: int, publish_ns: int, data: bytes) -> None:
+        """Append a message [ns]; MCAP knows no time before 0, so the file's own stamps stop there."""
+        if log_ns < 0 or publish_ns < 0:
+            log_ns, publish_ns = max(log_ns, 0), max(publish_ns, 0)
+        chunk, sequence, size = self._chunk, self._sequences[channel], len(data)
+        self._sequences[channel] = sequence + 1
         entries = chunk.offsets.get(channel)
         if entries is None:
             entries = chunk.offsets[channel] = []

@@ -117,25 +117,26 @@ def sightings_value(
         "camera": frame.camera,
         "t_ns": frame.t_ns,
         "available_ns": frame.available_ns,
-        "sightings": [
-            *(_sighting_value(sighting, used=True) for sighting in sightings),
-            *(_sighting_value(sighting, used=False) for sighting in refused),
-        ],
+        "sightings": _sighting_values(sightings, used=True) + _sighting_values(refused, used=False),
     }
 
 
-def _sighting_value(sighting: BallSighting, *, used: bool) -> Value:
-    u, v = sighting.uv_px.tolist()
-    uu, uv, _, vv = sighting.cov_px.ravel().tolist()
-    return {
-        "used": used,
-        "camera": sighting.camera,
-        "ball": sighting.ball,
-        "t_ns": sighting.t_ns,
-        "u_px": u,
-        "v_px": v,
-        "cov_px2": [uu, uv, vv],
-    }
+def _sighting_values(sightings: tuple[BallSighting, ...], *, used: bool) -> list[Value]:
+    values = []
+    for camera, ball, t_ns, uv_px, cov_px in sightings:
+        (u, v), ((uu, uv), (_, vv)) = uv_px.tolist(), cov_px.tolist()
+        values.append(
+            {
+                "used": used,
+                "camera": camera,
+                "ball": ball,
+                "t_ns": t_ns,
+                "u_px": u,
+                "v_px": v,
+                "cov_px2": [uu, uv, vv],
+            }
+        )
+    return values
 
 
 def health_value(health: Health) -> Value:

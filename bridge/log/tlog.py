@@ -15,6 +15,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 from contextlib import suppress
+from operator import itemgetter
 from pathlib import Path
 
 from bridge.log.entry import Entry
@@ -71,9 +72,10 @@ class TlogWriter:
         """
         if entry.wall_ns is not None:
             self._wall_less_stream_ns = entry.wall_ns - entry.now_ns
-        frames = [(message.arrived_ns, link, message.raw) for link, message in entry.heard.received]
-        frames += [(entry.now_ns, sent.link, sent.raw) for sent in entry.sent]
-        frames.sort(key=lambda frame: frame[0])
+        frames = [(entry.now_ns, sent.link, sent.raw) for sent in entry.sent]
+        if entry.heard.received:
+            heard = [(message.arrived_ns, link, message.raw) for link, message in entry.heard.received]
+            frames = sorted(heard + frames, key=itemgetter(0))
         for t_ns, link, raw in frames:
             number = self._numbers.get(link, 0)
             self._files[number].put(stamp(t_ns + self._wall_less_stream_ns, number) + raw)

@@ -10,6 +10,7 @@ from typing import Any
 
 from foxglove_schemas_protobuf.Log_pb2 import Log
 
+from bridge.heard import NOTHING
 from bridge.log import entry as values
 from bridge.log import scene, topics, vehicle
 from bridge.log.calibration import CALIBRATION_ATTACHMENT, calibration_json
@@ -46,24 +47,6 @@ class Cover:
     made_ns: int
 
 
-class Channel:
-    """One topic of an open file."""
-
-    def __init__(self, container: Container, topic: topics.Topic) -> None:
-        self._id = container.add_channel(
-            topic.name, topic.message_encoding, topic.schema_name, topic.schema_encoding, topic.schema
-        )
-        self._container = container
-        self._sequence = 0
-
-    def put(self, data: bytes, log_ns: int, publish_ns: int) -> None:
-        """Append a message; MCAP knows no time before 0, so the file's own stamps stop there."""
-        if log_ns < 0 or publish_ns < 0:
-            log_ns, publish_ns = max(log_ns, 0), max(publish_ns, 0)
-        self._container.add_message(self._id, self._sequence, log_ns, publish_ns, data)
-        self._sequence += 1
-
-
 class LogWriter:
     """Write a log to a stream that it then owns. For one thread.
 
@@ -77,7 +60,8 @@ class LogWriter:
         self._film = film
         self._container = Container(stream)
         self._cover = cover
-        self._channels: dict[str, Channel] = {}
+        self._channels: dict[str, int] = {}  # numbers by topic
+        self._sent: dict[str, topics.Topic] = {}  # by MAVLink name
         self._state: TrackState | None = None
         self._reset_counter: int | None = None
         self._film_ended = False
@@ -104,7 +88,8 @@ class LogWriter:
             self._write_estimate(estimate, entry.sent, now_ns)
         for sent in entry.sent:
             self._write_sent(sent, now_ns)
-        self._heard.write(entry.heard, now_ns)
+        if entry.heard is not NOTHING:
+            self._heard.write(entry.heard, now_ns)
         self._write_changes(entry)
 
     def warn(self, now_ns: int, message: str) -> None:
@@ -133,7 +118,7 @@ class LogWriter:
 
     def _write_scene(self, now_ns: int) -> None:
         for topic in topics.FIXED:
-            self._channels[topic.name] = Channel(self._container, topic)
+            self._open(topic)
         self._protobuf(topics.CAMERA_TF, scene.camera_transforms(self._cover.cameras), now_ns, now_ns)
         self._protobuf(topics.MARKER, scene.marker_scene(self._cover.marker), now_ns, now_ns)
         for camera in self._cover.cameras:
@@ -145,8 +130,8 @@ class LogWriter:
         p_BinW = value["p_BinW_m"]
         self._json(topics.ESTIMATE, value, now_ns, t_ns)
         pose, transform = vehicle.pose_and_transform(t_ns, p_BinW, q_BtoW)
-        self._channel(topics.POSE).put(pose, now_ns, t_ns)
-        self._channel(topics.VEHICLE_TF).put(transform, now_ns, t_ns)
+        self._put(topics.POSE, pose, now_ns, t_ns)
+        self._put(topics.VEHICLE_TF, transform, now_ns, t_ns)
         self._json(topics.LATENCY, values.latency_value(estimate, sent), now_ns, t_ns)
         if self._reset_counter is not None and estimate.reset_counter != self._reset_counter:
             message = f"the estimate jumped: reset_counter {self._reset_counter} -> {estimate.reset_counter}"
@@ -160,7 +145,7 @@ class LogWriter:
             data = film.develop(kept)
             if data is not None:
                 image = image_message(data, kept.t_ns, scene.camera_frame(camera))
-                self._channel(topics.image_topic(camera.name)).put(image, now_ns, kept.t_ns)
+                self._put(topics.image_topic(camera.name), image, now_ns, kept.t_ns)
                 return
             if self._film_ended:
                 return
@@ -170,10 +155,10 @@ class LogWriter:
         self._json(topics.EVENTS, mark_value(kept), now_ns, now_ns)
 
     def _write_sent(self, sent: Sent, now_ns: int) -> None:
-        name = topics.SENT_PREFIX + sent.message
-        if name not in self._channels:
-            self._channels[name] = Channel(self._container, topics.sent_topic(sent.message, sent.fields))
-        self._channels[name].put(encode(values.sent_value(sent)), now_ns, sent.t_ns)
+        topic = self._sent.get(sent.message)
+        if topic is None:
+            topic = self._sent[sent.message] = topics.sent_topic(sent.message, sent.fields)
+        self._put(topic, encode(values.sent_value(sent)), now_ns, sent.t_ns)
         if sent.message == STATUSTEXT:
             self._remark(now_ns, sent.t_ns, *line_of(sent.fields, f"to {sent.link}"))
 
@@ -189,13 +174,21 @@ class LogWriter:
         self._protobuf(topics.LOG, scene.remark(t_ns, level, name, message), now_ns, t_ns)
 
     def _json(self, topic: topics.Topic, value: dict[str, Any], now_ns: int, t_ns: int) -> None:
-        self._channel(topic).put(encode(value), now_ns, t_ns)
+        self._put(topic, encode(value), now_ns, t_ns)
 
     def _protobuf(self, topic: topics.Topic, message: Any, now_ns: int, t_ns: int) -> None:
-        self._channel(topic).put(message.SerializeToString(), now_ns, t_ns)
+        self._put(topic, message.SerializeToString(), now_ns, t_ns)
 
-    def _channel(self, topic: topics.Topic) -> Channel:
+    def _put(self, topic: topics.Topic, data: bytes, now_ns: int, t_ns: int) -> None:
+        """Append a message to a topic, which begins with its first one."""
         channel = self._channels.get(topic.name)
         if channel is None:
-            channel = self._channels[topic.name] = Channel(self._container, topic)
-        return channel
+            channel = self._open(topic)
+        self._container.add_message(channel, now_ns, t_ns, data)
+
+    def _open(self, topic: topics.Topic) -> int:
+        """Begin a topic and return its channel's number."""
+        self._channels[topic.name] = self._container.add_channel(
+            topic.name, topic.message_encoding, topic.schema_name, topic.schema_encoding, topic.schema
+        )
+        return self._channels[topic.name]

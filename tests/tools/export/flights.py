@@ -35,13 +35,13 @@ def write(path: Path, lines: Iterable[Line], metadata: dict[str, str] | None = N
     with path.open("wb") as file:
         container = Container(file)
         container.add_metadata("run", metadata or {"pace": "real"})
-        for number, line in enumerate(sorted(lines, key=lambda line: line.log_ns)):
+        for line in sorted(lines, key=lambda line: line.log_ns):
             if line.topic not in channels:
                 topic = topics.json_topic(line.topic, line.topic)
                 channels[line.topic] = container.add_channel(
                     topic.name, topic.message_encoding, topic.schema_name, topic.schema_encoding, topic.schema
                 )
-            container.add_message(channels[line.topic], number, line.log_ns, line.log_ns, encode(line.value))
+            container.add_message(channels[line.topic], line.log_ns, line.log_ns, encode(line.value))
         container.finish()
     return path
 
