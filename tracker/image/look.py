@@ -17,7 +17,7 @@ from tracker.image.centre import Centre
 from tracker.image.colour_table import ColourTable, colours_of_each
 from tracker.image.detect import Blob, find_blobs
 from tracker.image.patch import Expected
-from tracker.image.sight import COV, MISFIT, SIZE, SPOT, UV, Known, find_ball, known_of
+from tracker.image.sight import COV, MISFIT, SIZE, SPOT, UV, Known, find_ball, known_of, read_ahead
 from tracker.image.template import Template
 from tracker.image.tint import NEUTRAL, Gains
 from tracker.image.view import DEPTH, RADIUS, RAY_X, RAY_Y, SPEED_U, SPEED_V, U, V, expected_views
@@ -125,6 +125,7 @@ def _find_balls(frame: Frame, rig: Rig, state: State, gaze: Gaze, look: Look) ->
     image, camera, t_ns, appearance = frame.image, frame.camera, frame.t_ns, gaze.appearance
     known, colours, serve, eye = gaze.known, gaze.colours, gaze.album.serve, rig.cameras[camera]
     rows = expected_views(state, rig, camera, t_ns)
+    read_ahead(image, gaze.room.mean, rows)
     fits = np.empty((len(rows), SIZE))
     fixed = fits.view()
     fixed.flags.writeable = False

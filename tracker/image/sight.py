@@ -23,6 +23,7 @@ from tracker.types import Array, Image, Reason
 
 REGION_SIGMA = 3.5
 REGION_MARGIN_PX = 3.0
+LINE_BYTES = 64  # what memory sends at a time
 LEAST_AREA_SHARE, MOST_AREA_SHARE = 0.15, 4.0  # of the ball's expected disc
 UV, COV, MISFIT, SPOT, SIZE = slice(0, 2), slice(2, 6), 6, slice(7, 9), 9
 """What a fit gives: the centre [px], its covariance (uu, uv, vu, vv) [px^2], chi2 per degree of freedom, and the
@@ -81,6 +82,45 @@ def _ball_of(view: Array, answers: Array) -> Array:
     return ball
 
 
+@compiled("UniTuple(i8, 4)(f8[::1], i8, i8)")
+def _region(view: Array, width: int, height: int) -> tuple[int, int, int, int]:
+    """Return left, top, right and bottom, exclusive, of where a ball's spot is looked for in an image."""
+    u, v, radius_px = view[U], view[V], view[RADIUS]
+    half_u = REGION_SIGMA * np.sqrt(view[S_UU]) + radius_px + REGION_MARGIN_PX
+    half_v = REGION_SIGMA * np.sqrt(view[S_VV]) + radius_px + REGION_MARGIN_PX
+    left, top = max(0, math.floor(u - half_u)), max(0, math.floor(v - half_v))
+    return left, top, min(width, math.ceil(u + half_u) + 1), min(height, math.ceil(v + half_v) + 1)
+
+
+@compiled("i8(Array(u1, 3, 'C', True), Array(f4, 3, 'C'), f8[:, ::1])")
+def read_ahead(image: Image, room: NDArray[np.float32], views: Array) -> int:
+    """Read something of each line of memory that the search for some balls will need.
+
+    A frame just taken is in no cache. Here no read waits for another, so memory works on many at once; later each would
+    be waited for.
+
+    Args:
+        image: (height, width, 3) BGR.  room: what is known to stand behind, empty for nothing.
+        views: of `view.expected_views`.
+    Returns:
+        A sum of what was read; without it the compiler would leave the reading out.
+    """
+    height, width, total = image.shape[0], image.shape[1], 0
+    pixels, behind = image.reshape(image.size), room.reshape(room.size).view(np.int32)
+    for b in range(len(views)):
+        if not np.isfinite(views[b, U] + views[b, V] + views[b, RADIUS]):
+            continue
+        left, top, right, bottom = _region(views[b], width, height)
+        for row in range(top, bottom if left < right else top):
+            first, last = 3 * (row * width + left), 3 * (row * width + right)
+            for i in range(first, last, LINE_BYTES):
+                total += pixels[i]
+            total += pixels[last - 1]
+            for i in range(first, min(last, len(behind)), LINE_BYTES // 4):
+                total += behind[i]
+    return total
+
+
 @compiled(
     "UniTuple(f8, 2)(Array(u1, 3, 'C', True), Array(i2, 2, 'C', True), Array(i2, 1, 'C', True),"
     "Array(b1, 2, 'C', True), i8, i8, f8[::1])"
@@ -90,11 +130,8 @@ def _nearest_spot(
     blue: int, red: int, view: Array,
 ) -> tuple[float, float]:  # fmt: skip
     """Return the middle of the spot nearest the prediction; NaN when there is none, infinity out of view."""
-    height, width, u, v, radius_px = image.shape[0], image.shape[1], view[U], view[V], view[RADIUS]
-    half_u = REGION_SIGMA * np.sqrt(view[S_UU]) + radius_px + REGION_MARGIN_PX
-    half_v = REGION_SIGMA * np.sqrt(view[S_VV]) + radius_px + REGION_MARGIN_PX
-    left, top = max(0, math.floor(u - half_u)), max(0, math.floor(v - half_v))
-    right, bottom = min(width, math.ceil(u + half_u) + 1), min(height, math.ceil(v + half_v) + 1)
+    u, v, radius_px = view[U], view[V], view[RADIUS]
+    left, top, right, bottom = _region(view, image.shape[1], image.shape[0])
     if not (left < right and top < bottom):
         return np.inf, np.inf
     area = math.pi * radius_px**2
