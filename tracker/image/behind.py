@@ -86,17 +86,16 @@ def is_known(looks: NDArray[np.uint8], u: int, v: int, half: int, least: int) ->
 
 
 @compiled("f8(i8, i8, f8, f8)")
-def _away_px(tile: int, columns: int, u: float, v: float) -> float:
+def _away_px(row: int, column: int, u: float, v: float) -> float:
     """Return how far a tile's nearest pixel is from a place."""
-    left, top = float(tile % columns * TILE_PX), float(tile // columns * TILE_PX)
+    left, top = float(column * TILE_PX), float(row * TILE_PX)
     du, dv = max(left - u, 0.0, u - left - TILE_PX), max(top - v, 0.0, v - top - TILE_PX)
     return float(np.sqrt(du * du + dv * dv))
 
 
-@compiled("void(Array(u1, 3, 'C', True), Array(f4, 3, 'C'), Array(u1, 2, 'C'), i8)")
-def _look_at(image: Image, mean: NDArray[np.float32], looks: NDArray[np.uint8], tile: int) -> None:
+@compiled("void(Array(u1, 3, 'C', True), Array(f4, 3, 'C'), Array(u1, 2, 'C'), i8, i8)")
+def _look_at(image: Image, mean: NDArray[np.float32], looks: NDArray[np.uint8], row: int, column: int) -> None:
     """Take a tile into its mean, or begin it anew where something else stands now."""
-    row, column = tile // looks.shape[1], tile % looks.shape[1]
     top, left, known = row * TILE_PX, column * TILE_PX, looks[row, column]
     if known > 0:
         total = squares = 0.0
@@ -127,29 +126,32 @@ def _learn(
     """
     rows, columns = looks.shape
     chosen, needs, count = np.empty(MANY, np.int64), np.empty(MANY), 0
-    for tile in range(rows * columns):
-        known = looks[tile // columns, tile % columns]
-        if known >= ENOUGH or abs(t_ns - looked_ns[tile // columns, tile % columns]) < APART_NS:
-            continue
-        away_px = _away_px(tile, columns, u, v)
-        need = NEARER * known + away_px / TILE_PX
-        if away_px < clear_px or (count == MANY and need >= needs[MANY - 1]):
-            continue
-        count = min(count + 1, MANY)
-        k = count - 1
-        while k > 0 and needs[k - 1] > need:
-            needs[k], chosen[k] = needs[k - 1], chosen[k - 1]
-            k -= 1
-        needs[k], chosen[k] = need, tile
+    for row in range(rows):
+        for column in range(columns):
+            known = looks[row, column]
+            if known >= ENOUGH or abs(t_ns - looked_ns[row, column]) < APART_NS:
+                continue
+            away_px = _away_px(row, column, u, v)
+            need = NEARER * known + away_px / TILE_PX
+            if away_px < clear_px or (count == MANY and need >= needs[MANY - 1]):
+                continue
+            count = min(count + 1, MANY)
+            k = count - 1
+            while k > 0 and needs[k - 1] > need:
+                needs[k], chosen[k] = needs[k - 1], chosen[k - 1]
+                k -= 1
+            needs[k], chosen[k] = need, row * columns + column
     eager = False
     for k in range(count):
-        unknown = looks[chosen[k] // columns, chosen[k] % columns] < WELL_KNOWN
+        row, column = chosen[k] // columns, chosen[k] % columns
+        unknown = looks[row, column] < WELL_KNOWN
         eager = eager or unknown
         if k < SOME or unknown:
-            _look_at(image, mean, looks, chosen[k])
-            looked_ns[chosen[k] // columns, chosen[k] % columns] = t_ns
+            _look_at(image, mean, looks, row, column)
+            looked_ns[row, column] = t_ns
     for _ in range(FEW):
         following[0] = (following[0] + 1) % (rows * columns)
-        if _away_px(following[0], columns, u, v) >= clear_px:
-            _look_at(image, mean, looks, following[0])
+        row, column = following[0] // columns, following[0] % columns
+        if _away_px(row, column, u, v) >= clear_px:
+            _look_at(image, mean, looks, row, column)
     return eager

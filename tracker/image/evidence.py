@@ -18,11 +18,14 @@ from tracker.types import Array
 LEAST_EVIDENCE = 60.0
 
 
-@compiled("f8(f8[:, ::1], f8[::1], f8[::1])")
-def explained(pixels: Array, tukey: Array, squares: Array) -> float:
-    """Return by how much the squares left in brightness or colour (n,) are fewer than without a ball."""
+@compiled("f8(f8[:, ::1], f8[::1], f8[::1], f8[:, ::1])")
+def explained(pixels: Array, tukey: Array, squares: Array, work: Array) -> float:
+    """Return by how much the squares left in brightness or colour (n,) are fewer than without a ball.
+
+    work (PLANE + channels or more, n): overwritten.
+    """
     channels, n = channels_of(pixels), pixels.shape[1]
-    rows, products = np.empty((PLANE + channels, n)), np.empty((PLANE + channels, PLANE + channels))
+    rows, products = work[: PLANE + channels], np.empty((PLANE + channels, PLANE + channels))
     kept = 0.0
     for i in range(n):
         weight = tukey[i] * pixels[TRUST, i]

@@ -142,19 +142,38 @@ def _add_channel(
     normal[4] += vr
 
 
-@compiled("void(f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[::1], f8[::1])")
-def _linearise(pixels: Array, drawn: Array, tukey: Array, work: Array, squares: Array, normal: Array) -> None:
+@compiled("i8(i8, i8)")
+def _rows_of_sheet(shapes: int, channels: int) -> int:
+    """Return the rows that `_laid_out` divides."""
+    return rows_of(shapes) + shapes + PLANE + 4 * channels + 3
+
+
+@compiled("Tuple((f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1]))(f8[:, ::1], i8, i8)")
+def _laid_out(sheet: Array, shapes: int, channels: int) -> tuple[Array, Array, Array, Array, Array]:
+    """Divide a sheet (rows, n) for the fit of a brightness or a colour: to ask for memory takes as long as to solve.
+
+    Returns what is drawn (4p + 3, n), see `draw_at`; work (m + 1 + 3 channels, n), see `_linearise`; what is seen
+    (channels, n); Tukey's weights and the squares left (n,).
+    """
+    work, seen = rows_of(shapes), rows_of(shapes) + shapes + PLANE + 1 + 3 * channels
+    tukey, squares = seen + channels, seen + channels + 1
+    return sheet[:work], sheet[work:seen], sheet[seen:tukey], sheet[tukey], sheet[squares]
+
+
+@compiled("void(f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1])")
+def _linearise(
+    pixels: Array, drawn: Array, tukey: Array, work: Array, seen: Array, small: Array, squares: Array, normal: Array
+) -> None:
     """Linearise the brightness or the colour of a patch about the centre that a ball was drawn at, see `draw_at`.
 
     work (m + 1 + 3 channels, n): overwritten, its last rows by what each channel leaves and its slopes by u and by v.
+    seen (channels, n), small (m + channels + 2, m): overwritten.
     Fills in squares (n,) and normal (5,) as `_add_channel` does.
     """
-    channels = channels_of(pixels)
-    m = len(work) - 1 - 3 * channels
-    weight, seen = work[m], np.empty((channels, pixels.shape[1]))
+    channels, m = len(seen), small.shape[1]
+    weight = work[m]
     for i in range(len(weight)):
         weight[i] = (tukey[i] * pixels[TRUST, i]) ** 2
-    small = np.empty((m + channels + 2, m))  # in one piece: to ask for memory takes as long as to solve
     factor, coefficients, T = small[:m], small[m : m + channels], small[m + channels :]
     squares[:] = 0.0
     normal[:] = 0.0
@@ -222,11 +241,16 @@ def gauss_newton(
     than without one.
     """
     p, n_bright, n_colour = luma.shape[2], bright.shape[1], colour.shape[1]
-    drawn_b, drawn_c = np.empty((rows_of(p), n_bright)), np.empty((rows_of(p), n_colour))
-    work_b, work_c = np.empty((p + PLANE + 4, n_bright)), np.empty((p + PLANE + 7, n_colour))
-    tukey_b, squares_b, normal_b = np.ones(n_bright), np.empty(n_bright), np.empty(NORMAL)
-    tukey_c, squares_c, normal_c = np.ones(n_colour), np.empty(n_colour), np.empty(NORMAL)
-    octants, normal = np.zeros((OCTANTS, NORMAL)), np.empty(NORMAL)
+    drawn_b, work_b, seen_b, tukey_b, squares_b = _laid_out(np.empty((_rows_of_sheet(p, 1), n_bright)), p, 1)
+    drawn_c, work_c, seen_c, tukey_c, squares_c = _laid_out(np.empty((_rows_of_sheet(p, 2), n_colour)), p, 2)
+    tukey_b[:], tukey_c[:] = 1.0, 1.0
+    small, normals = np.empty((p + PLANE + 4, p + PLANE)), np.zeros((OCTANTS + 3, NORMAL))
+    octants, normal_b, normal_c, normal = (
+        normals[:OCTANTS],
+        normals[OCTANTS],
+        normals[OCTANTS + 1],
+        normals[OCTANTS + 2],
+    )
     misfit_b = misfit_c = at_u = at_v = 0.0
     noise_b = noise_c = 1.0
     drawn_u = drawn_v = np.inf  # where the ball is drawn: nowhere yet
@@ -236,11 +260,12 @@ def gauss_newton(
             draw_at(bright, luma, luma_made, ball, LUMA_VAR, at_u, at_v, drawn_b)
             draw_at(colour, chroma, chroma_made, ball, CHROMA_VAR, at_u, at_v, drawn_c)
             drawn_u, drawn_v = at_u, at_v
-        _linearise(bright, drawn_b, tukey_b, work_b, squares_b, normal_b)
-        _linearise(colour, drawn_c, tukey_c, work_c, squares_c, normal_c)
+        _linearise(bright, drawn_b, tukey_b, work_b, seen_b, small[:-1], squares_b, normal_b)
+        _linearise(colour, drawn_c, tukey_c, work_c, seen_c, small, squares_c, normal_c)
         misfit_b, noise_b = _misfit(squares_b, tukey_b, 1, p, normal_b)
         misfit_c, noise_c = _misfit(squares_c, tukey_c, 2, p, normal_c)
-        normal[:] = normal_b + normal_c
+        for k in range(NORMAL):
+            normal[k] = normal_b[k] + normal_c[k]
         det = normal[0] * normal[2] - normal[1] * normal[1]
         new_u = at_u + min(1.0, max(-1.0, (normal[2] * normal[3] - normal[1] * normal[4]) / det))
         new_v = at_v + min(1.0, max(-1.0, (normal[0] * normal[4] - normal[1] * normal[3]) / det))
@@ -256,4 +281,5 @@ def gauss_newton(
     add_octants(colour, work_c[p + PLANE + 1 :], at_u, at_v, 1.0 / noise_c, octants)
     doubted_covariance(normal, disagreement(normal_b, normal_c), octants, u - at_u, v - at_v, fit[2:5])
     fit[5] = (misfit_b * n_bright + misfit_c * 2 * n_colour) / (n_bright + 2 * n_colour)
-    fit[EVIDENCE] = (explained(bright, tukey_b, squares_b) + explained(colour, tukey_c, squares_c)) / max(TINY, fit[5])
+    evidence = explained(bright, tukey_b, squares_b, work_b) + explained(colour, tukey_c, squares_c, work_c)
+    fit[EVIDENCE] = evidence / max(TINY, fit[5])

@@ -151,6 +151,17 @@ def trust_of(gamma: float) -> Array:
     return np.asarray(1.0 / (gamma * share ** (gamma - 1.0)))
 
 
+@compiled("i8(i8, i8, i8, i8, f8, f8, f8)")
+def _blocks_within(u: int, v: int, half: int, block: int, du: float, dv: float, reach_px: float) -> int:
+    """Count the blocks of a patch whose middle is nearer to the ball than that."""
+    count = 0
+    for top in range(v - half + ((v - half) % block), v + half - block + 2, block):
+        for left in range(u - half + ((u - half) % block), u + half - block + 2, block):
+            x, y = left + (block - 1) / 2 - u, top + (block - 1) / 2 - v
+            count += (x - du) ** 2 + (y - dv) ** 2 < reach_px**2
+    return count
+
+
 @compiled(
     "Tuple((f8[:, ::1], f8[:, ::1]))(Array(uint8, 3, 'C', True), Array(f4, 3, 'C'), Array(u1, 2, 'C'), i8, i8, i8, i8,"
     "f8, f8, f8, f8[::1], f8[::1])"
@@ -160,15 +171,16 @@ def cut_pixels(
     du: float, dv: float, edge_px: float, light: Array, trust: Array,
 ) -> tuple[Array, Array]:  # fmt: skip
     """Cut out and whiten; (u, v) is the middle pixel, (du, dv) the ball's place from there. See `Patch`."""
-    pixels = (2 * half + 1) ** 2
-    bright, colour, scale, count = np.empty((5, pixels)), np.empty((7, pixels)), np.empty(SCALES), 0
+    reach_px, count = edge_px + MARGIN_PX, 0
+    blocks = _blocks_within(u, v, half, block, du, dv, reach_px)
+    bright, colour, scale = np.empty((5, blocks * block**2)), np.empty((7, blocks)), np.empty(SCALES)
     share, known = 1.0 / (block * block), is_known(looks, u, v, half, KNOWN)
     whitening(image, room, known, u, v, half, block, du, dv, edge_px + RING_PX, scale)
     shows = scale[ROOM_SHARE]
     for top in range(v - half + ((v - half) % block), v + half - block + 2, block):
         for left in range(u - half + ((u - half) % block), u + half - block + 2, block):
             x, y = left + (block - 1) / 2 - u, top + (block - 1) / 2 - v
-            if (x - du) ** 2 + (y - dv) ** 2 >= (edge_px + MARGIN_PX) ** 2:
+            if not (x - du) ** 2 + (y - dv) ** 2 < reach_px**2:
                 continue
             mean = blue = red = blue_behind = red_behind = 0.0
             clipped = False
@@ -203,7 +215,7 @@ def cut_pixels(
             colour[BLUE + 2, count] = shows * blue_behind * scale[BLUE_SCALE]
             colour[RED + 2, count] = shows * (red_behind * scale[RED_SCALE] - blue_behind * scale[RED_BY_BLUE])
             count += 1
-    return np.ascontiguousarray(bright[:, : count * block**2]), np.ascontiguousarray(colour[:, :count])
+    return bright, colour
 
 
 @compiled("i8(f8[:, ::1])")

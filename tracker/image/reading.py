@@ -16,35 +16,34 @@ RADIUS, LUMA_VAR, CHROMA_VAR, STREAK_U, STREAK_V, BALL_SIZE = range(6)
 far its image moves during the exposure [px]."""
 
 
-@compiled("i8[:, ::1](f8, f8, f8)")
-def _places_along(streak_u: float, streak_v: float, per_px: float) -> NDArray[np.int64]:
-    """Return where along a streak the ball is drawn (2, k): steps in u and v from its middle [1/per_px px]."""
+@compiled("Tuple((i8, f8))(f8, f8)")
+def _places_along(streak_u: float, streak_v: float) -> tuple[int, float]:
+    """Return at how many places along a streak the ball is drawn, and what share of it they take up."""
     length = math.sqrt(streak_u * streak_u + streak_v * streak_v)
     shrink = min(1.0, STREAK_MAX_PX / length) if length > 0.0 else 0.0
-    count = math.ceil(2.0 * length * shrink) | 1
-    places = np.empty((2, count), np.int64)
-    for k in range(count):
-        along = ((k + 0.5) / count - 0.5) * shrink * per_px
-        places[0, k], places[1, k] = round(along * streak_u), round(along * streak_v)
-    return places
+    return math.ceil(2.0 * length * shrink) | 1, shrink
 
 
-@compiled("void(Array(float32, 3, 'C', True), i8, i8, f8, i8[:, ::1], f8[:, ::1], f4[:, :, ::1])")
+@compiled("i8(Array(float32, 3, 'C', True), i8, i8, f8, f8[::1], f8[:, ::1], f4[:, :, ::1])")
 def _gather(
-    fine: NDArray[np.float32], u_steps: int, v_steps: int, per_px: float, places: NDArray[np.int64], pixels: Array,
+    fine: NDArray[np.float32], u_steps: int, v_steps: int, per_px: float, ball: Array, pixels: Array,
     sums: NDArray[np.float32],
-) -> None:  # fmt: skip
-    """Fill in (5, p, n) each shape at each pixel and at its four neighbours on the grid, summed over all places.
+) -> int:  # fmt: skip
+    """Fill in (5, p, n) each shape at each pixel and at its four neighbours on the grid, summed over a streak's places.
 
     They come in the order here, left, right, above, below. The rim, where all beyond is read, is empty.
+    Returns how many places there are.
     """
     size, shapes = len(fine), fine.shape[2]
     middle, flat, last = size // 2, fine.reshape(size * size * shapes), size - 2
     along, below = np.uint64(shapes), np.uint64(size * shapes)  # unsigned, so that no index is looked at for its sign
     starts = np.empty(pixels.shape[1], np.uint64)
     sums[:] = np.float32(0.0)
-    for k in range(places.shape[1]):
-        u_place, v_place = middle - u_steps - places[0, k], middle - v_steps - places[1, k]
+    count, shrink = _places_along(ball[STREAK_U], ball[STREAK_V])
+    for k in range(count):
+        from_middle = ((k + 0.5) / count - 0.5) * shrink * per_px
+        u_place = middle - u_steps - round(from_middle * ball[STREAK_U])
+        v_place = middle - v_steps - round(from_middle * ball[STREAK_V])
         for i in range(len(starts)):
             column, row = u_place + int(pixels[0, i] * per_px), v_place + int(pixels[1, i] * per_px)
             c, r = min(max(column, 1), last), min(max(row, 1), last)
@@ -58,6 +57,7 @@ def _gather(
                 right[i] += flat[at + along]
                 above[i] += flat[at - below]
                 under[i] += flat[at + below]
+    return count
 
 
 @compiled(
@@ -83,13 +83,12 @@ def read(
     """
     per_px, share = made[0], (ball[RADIUS] - made[1]) / ball[RADIUS]
     lacking = ball[variance] - made[2] * (ball[RADIUS] / made[1]) ** 2
-    places = _places_along(ball[STREAK_U], ball[STREAK_V], per_px)
     u_steps, v_steps = round(u * per_px), round(v * per_px)
     off_u, off_v = u - u_steps / per_px, v - v_steps / per_px
     lacking += 0.5 * (off_u * off_u + off_v * off_v)  # of a step's second order what has no direction
-    n, mean = pixels.shape[1], 1.0 / places.shape[1]
+    n = pixels.shape[1]
     sums = np.empty((5, len(value), n), np.float32)
-    _gather(fine, u_steps, v_steps, per_px, places, pixels, sums)
+    mean = 1.0 / _gather(fine, u_steps, v_steps, per_px, ball, pixels, sums)
     slope, curve = 0.5 * mean * per_px, 0.5 * mean * per_px * per_px
     first, second = share + 0.5 * share * share, share * share
     for p in range(len(value)):

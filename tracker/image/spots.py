@@ -90,7 +90,7 @@ def _likely(spots: NDArray[np.int64], count: int, most_px: float) -> Array:
         likely[place, 0], likely[place, 3] = spots[k, _BALL], area
         likely[place, 1], likely[place, 2] = spots[k, _SUM_U] / area, spots[k, _SUM_V] / area
         kept += 1
-    return likely[:kept].copy()
+    return likely[:kept]
 
 
 @compiled("i8(Array(i2, 1, 'C', readonly=True))")
@@ -102,13 +102,17 @@ def _shift_for(lowest_spread: NDArray[np.int16]) -> int:
     return 2
 
 
-@compiled("void(Array(u1, 3, 'C', readonly=True), i8, i8, i8, i8, u1[:, ::1])")
-def _line(image: Image, row: int, left: int, blue_by: int, red_by: int, line: NDArray[np.uint8]) -> None:
-    """Fill in the pixels of a row from `left` on, the colour of the light undone."""
-    first = np.uint64((row * image.shape[1] + left) * 3)
-    pixels, copy = image.reshape(image.size), line.reshape(line.size)  # of two axes each byte would be taken by itself
-    for i in range(np.uint64(len(copy))):
-        copy[i] = pixels[first + i]
+@compiled("void(Array(u1, 1, 'C', readonly=True), i8, i8, i8, u1[::1], u1[:, ::1])")
+def _line(
+    pixels: NDArray[np.uint8], start: int, blue_by: int, red_by: int, flat: NDArray[np.uint8], line: NDArray[np.uint8]
+) -> None:
+    """Fill in the pixels of a row, the colour of the light undone.
+
+    pixels: of the image, byte by byte, those of the row from `start` on.  flat: the same memory as line.
+    """
+    first = np.uint64(start)
+    for i in range(np.uint64(len(flat))):  # of two axes each byte would be taken by itself
+        flat[i] = pixels[first + i]
     if blue_by == UNITY and red_by == UNITY:
         return
     blue, red, most = np.uint16(blue_by), np.uint16(red_by), np.uint16(LEVELS - 1)
@@ -254,9 +258,10 @@ def find_spots(
     lengths = np.zeros((2, colours), np.int64)
     shift = _shift_for(lowest_spread) if right - left >= WIDE_PX else 0
     line, flags = np.empty((right - left, 3), np.uint8), np.zeros((right - left + 7) // 8 * 8, np.uint8)
+    bytes_of_image, bytes_of_line = image.reshape(image.size), line.reshape(line.size)
     for row in range(top, bottom):
         above, here = (row - 1) & 1, row & 1
-        _line(image, row, left, blue, red, line)
+        _line(bytes_of_image, (row * image.shape[1] + left) * 3, blue, red, bytes_of_line, line)
         found = _coloured(line, left, lowest_spread, shift, flags, pixels)
         for ball in range(colours):
             length = _runs(pixels, found, least_spread[ball], hues[ball], runs[here, ball])

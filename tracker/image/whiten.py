@@ -63,17 +63,18 @@ def _add_products(products: Array, x: float, y: float, a: float, b: float) -> No
     products[4, 4] += b * b
 
 
-@compiled("UniTuple(f8, 2)(Array(uint8, 3, 'C', True), Array(f4, 3, 'C'), b1, i8, i8, i8, i8, f8, f8, f8)")
+@compiled("UniTuple(f8, 2)(Array(uint8, 3, 'C', True), Array(f4, 3, 'C'), b1, i8, i8, i8, i8, f8, f8, f8, f8[:, ::1])")
 def _brightness(
     image: Image, room: NDArray[np.float32], known: bool, u: int, v: int, half: int, block: int, du: float, dv: float,
-    beyond_px: float,
+    beyond_px: float, products: Array,
 ) -> tuple[float, float]:  # fmt: skip
     """Return the variance of luma about a plane and the room, and how strongly that shows: 0 if it is no help.
 
+    products (5, 5): overwritten.
     Source: least squares on 1, x, y and the room, whose share is 1 unless seen otherwise. A mean of few looks is noise
         in part; least squares then finds a share below 1, which is what takes out most.
     """
-    products = np.zeros((5, 5))
+    products[:] = 0.0
     for top in range(v - half + ((v - half) % block), v + half - block + 2, block):
         for left in range(u - half + ((u - half) % block), u + half - block + 2, block):
             x, y = left + (block - 1) / 2 - u, top + (block - 1) / 2 - v
@@ -107,8 +108,9 @@ def whitening(
     That is the variation about a plane and, where it is known, the room. Luma varies by pixel, colour by block; colour
     is made white by Cholesky's factor.
     """
-    variance, share = _brightness(image, room, known, u, v, half, block, du, dv, beyond_px)
-    products = np.zeros((5, 5))
+    products = np.empty((5, 5))
+    variance, share = _brightness(image, room, known, u, v, half, block, du, dv, beyond_px, products)
+    products[:] = 0.0
     for top in range(v - half + ((v - half) % block), v + half - block + 2, block):
         for left in range(u - half + ((u - half) % block), u + half - block + 2, block):
             x, y = left + (block - 1) / 2 - u, top + (block - 1) / 2 - v
