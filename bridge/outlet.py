@@ -92,9 +92,10 @@ class Outlet:
         self._now_ns = now_ns
         self._calibration = self._calibration if step.health is None else step.health.brief
         for spout in self._spouts:
-            self._received.extend([(spout.link.name, message) for message in spout.hear()])
-            superseded = spout.link.state().superseded
-            for message in spout.dialogue.due(step.state, now_ns, superseded, self._calibration):
+            heard = spout.hear()
+            if heard:
+                self._received.extend([(spout.link.name, message) for message in heard])
+            for message in spout.dialogue.due(step.state, now_ns, spout.link.replaced(), self._calibration):
                 spout.link.send(message)
         for estimate in step.estimates:
             admitted = [spout for spout in self._spouts if spout.dialogue.admits(estimate, now_ns)]
@@ -118,7 +119,7 @@ class Outlet:
 
     def received(self) -> tuple[tuple[str, Received], ...]:
         """Return the messages that came in up to the last `send` and were not yet returned, with their link's URI."""
-        return tuple([self._received.popleft() for _ in range(len(self._received))])
+        return tuple([self._received.popleft() for _ in range(len(self._received))]) if self._received else ()
 
     def far_ends(self) -> tuple[DialogueState, ...]:
         """Return what was known of each link's far end at the last `send`, in the links' order."""

@@ -34,7 +34,7 @@ class Ear:
 
     def take(self) -> list[Received]:
         """Return the messages that came in since the last call."""
-        return [self._heard.popleft() for _ in range(len(self._heard))]
+        return [self._heard.popleft() for _ in range(len(self._heard))] if self._heard else []
 
     def _hear(self, data: bytes) -> None:
         for message in self._reader.feed(data, self._now()):

@@ -40,6 +40,9 @@ class Link(Protocol):
         `heard` may call `send`, which any thread may.
         """
 
+    def replaced(self) -> int:
+        """Return how many messages a newer one has replaced so far."""
+
     def state(self) -> LinkState:
         """Return how the link fares."""
 

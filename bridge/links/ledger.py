@@ -74,6 +74,10 @@ class Ledger:
             records, self._records = self._records, []
         return records
 
+    def replaced(self) -> int:
+        """Return how many messages a newer one has replaced so far."""
+        return self._superseded
+
     def state(self) -> LinkState:
         """Return the books as they stand."""
         with self._lock:

@@ -55,6 +55,10 @@ class MemoryLink:
         self._inbox.clear()
         return data
 
+    def replaced(self) -> int:
+        """Return how many messages a newer one has replaced so far."""
+        return self._ledger.replaced()
+
     def state(self) -> LinkState:
         """Return how the link fares."""
         return self._ledger.state()

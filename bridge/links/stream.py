@@ -99,6 +99,10 @@ class StreamLink:
         """Give what comes in from now on to `heard`, from the link's thread, as it comes."""
         self._heard = heard
 
+    def replaced(self) -> int:
+        """Return how many messages a newer one has replaced so far."""
+        return self._ledger.replaced()
+
     def state(self) -> LinkState:
         """Return how the link fares."""
         return self._ledger.state()

@@ -49,6 +49,10 @@ class _UdpLink(ABC):
         """Return what has left since the last call."""
         return self._ledger.collect()
 
+    def replaced(self) -> int:
+        """Return how many messages a newer one has replaced so far."""
+        return self._ledger.replaced()
+
     def state(self) -> LinkState:
         """Return how the link fares."""
         return self._ledger.state()

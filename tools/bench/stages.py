@@ -110,6 +110,10 @@ class TimedLink:
         """Give what comes in to `heard`."""
         self._link.listen(heard)
 
+    def replaced(self) -> int:
+        """Return how many messages a newer one has replaced so far."""
+        return self._link.replaced()
+
     def state(self) -> LinkState:
         """Return how the link fares."""
         return self._link.state()
