@@ -119,11 +119,11 @@ class Tracker:
 
     def _take_round(self, frames: Round, harvest: Harvest) -> None:
         """Find the vehicle in a round, and see whether the cameras still stand where they did."""
-        first = len(harvest.sightings), len(harvest.refused)
-        self._locate(frames, harvest)
+        first, t_ns = (len(harvest.sightings), len(harvest.refused)), max([frame.t_ns for frame in frames])
+        self._locate(frames, t_ns, harvest)
         state = self._history.newest if self._track is TrackState.TRACKING else None
         used, refused = harvest.sightings[first[0] :], harvest.refused[first[1] :]
-        health = self._watch.take(frames, used, refused, state, max(frame.t_ns for frame in frames))
+        health = self._watch.take(frames, used, refused, state, t_ns)
         if health is not None:
             harvest.health = health
             self._stand_by(health)
@@ -141,11 +141,10 @@ class Tracker:
                 self._history.doubt(index, SHARE * camera.shift_px)
                 self._anew = True
 
-    def _locate(self, frames: Round, harvest: Harvest) -> None:
-        """Follow the track through a round, or look for the marker in it, and say where it is."""
+    def _locate(self, frames: Round, t_ns: int, harvest: Harvest) -> None:
+        """Follow the track through a round, the last of it of t_ns, or look for the marker in it; say where it is."""
         started_ns = self._stopwatch()
         harvest.find_ns = harvest.filter_ns = 0
-        t_ns = max(frame.t_ns for frame in frames)
         if self._history.forgot(t_ns):
             harvest.rejections += [_late(frame) for frame in frames]
             return
@@ -160,7 +159,7 @@ class Tracker:
             found = (self._search(frames, t_ns, harvest) if few else None) or found
         if found is None or found.state.t_ns <= self._sent_ns:
             return
-        available_ns = max(frame.available_ns for frame in frames)
+        available_ns = max([frame.available_ns for frame in frames])
         stages = harvest.stages(started_ns - available_ns, self._stopwatch() - started_ns)
         self._sent_ns = found.state.t_ns
         self._continuity.went_out(found.state)
@@ -247,8 +246,8 @@ class Tracker:
             if seen_ns.get((camera, ball), t_ns) <= t_ns:
                 seen_ns[camera, ball] = t_ns
         newest_ns = max(seen_ns.values())
-        lately = [place for place, t_ns in seen_ns.items() if newest_ns - t_ns <= POSED_NS]
-        return len(lately) < POSED or len({ball for _, ball in lately}) < 2
+        lately = [ball for (_, ball), t_ns in seen_ns.items() if newest_ns - t_ns <= POSED_NS]
+        return len(lately) < POSED or len(set(lately)) < 2
 
     def _still_known(self, start: State) -> State:
         """Return a first guess with what the last track learned of the cameras: their noise and their clocks."""

@@ -27,6 +27,7 @@ class Rounds:
         self._shared = [deque([everyone], maxlen=MEMORY) for _ in range(camera_count)]
         self._companions = [everyone for _ in range(camera_count)]  # of `_shared`, all together
         self._open: dict[int, Frame] = {}
+        self._opened_ns = 0  # the first stamp in it
         self._closed_ns = -(2**63)
         self._closed: frozenset[int] = frozenset()
 
@@ -37,6 +38,7 @@ class Rounds:
             return [self._close()] if self._open else []
         if self._open and (event.camera in self._open or not self._one_instant(event)):
             closed.append(self._close())
+        self._opened_ns = min(self._opened_ns, event.t_ns) if self._open else event.t_ns
         self._open[event.camera] = event
         if self._expected() <= self._open.keys():
             closed.append(self._close())
@@ -51,8 +53,7 @@ class Rounds:
 
     def _stragglers_of(self) -> frozenset[int]:
         """Return the cameras of the last closed round, if the open one is of the same instant."""
-        first_ns = min([frame.t_ns for frame in self._open.values()])
-        return self._closed if abs(first_ns - self._closed_ns) <= self._window_ns else NOBODY
+        return self._closed if abs(self._opened_ns - self._closed_ns) <= self._window_ns else NOBODY
 
     def _expected(self) -> frozenset[int]:
         """Return the cameras that the open round waits for."""

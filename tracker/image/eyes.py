@@ -32,6 +32,8 @@ class Eyes:
     """What each camera of a rig knows of how balls look to it.
 
     doubts_px: (cameras,) by how much all centres may be wrong together for what is not known, one sigma [px].
+    exposure_s: how long the slowest shutter stands open, as learned [s].
+    lessons_due: how often the first images should be gone over again, since nothing else is known yet.
     """
 
     def __init__(self, rig: Rig) -> None:
@@ -55,6 +57,8 @@ class Eyes:
             if self._gazes[index].appearance is not appearance:
                 self._gazes[index] = self._gazes[index].at_such(appearance)
         self._exposures_s = tuple([appearance.response.exposure_s for appearance in appearances])
+        self.exposure_s = max(self._exposures_s)
+        self.lessons_due = max(rivals.lessons_due for rivals in self._rivals)
         self.doubts_px = np.array([rivals.doubt_px for rivals in self._rivals])
         self._gamma_known = all(rivals.settled or rivals.by_room for rivals in self._rivals)  # if not for the last time
         enough = all(rivals.count >= LEARN_ALL or rivals.by_room for rivals in self._rivals)
@@ -67,16 +71,6 @@ class Eyes:
             if now is not before:
                 behind.forget()
         self._rig = rig
-
-    @property
-    def lessons_due(self) -> int:
-        """Return how often the first images should be gone over again, since nothing else is known yet."""
-        return max(rivals.lessons_due for rivals in self._rivals)
-
-    @property
-    def exposure_s(self) -> float:
-        """Return how long the slowest shutter stands open, as learned [s]."""
-        return max(self._exposures_s)
 
     @property
     def gains(self) -> tuple[Gains, ...]:
