@@ -67,7 +67,8 @@ def make_batch(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig)
     """Compare sightings with a prediction. A ball predicted behind its camera has NaN for an innovation."""
     state, T = ahead.state, ahead.process.manoeuvre_s
     seen_by, seen, stamps_ns, uvs_px, covs_px2 = zip(*sightings, strict=True)
-    cameras, balls, lags_s = np.array(seen_by), np.array(seen), (np.array(stamps_ns) - state.t_ns) * 1e-9
+    cameras, balls = np.array(seen_by), np.array(seen)
+    lags_s = np.array([(t_ns - state.t_ns) * 1e-9 for t_ns in stamps_ns])
     z, covs_px = np.concatenate(uvs_px), np.concatenate(covs_px2)
     y, R, A, B, path, doubt = _compared(
         state.mean, state.P, ahead.P_coasted, ahead.dt, T, z, covs_px, state.noise, cameras, balls, lags_s,

@@ -70,7 +70,8 @@ def update(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig, pro
     if not near:
         return Rejected(Reason.FRAME_GATE, "no sighting near the prediction", ahead.state.t_ns)
     seen, batch = batch.cameras, batch.part(near)
-    if set(batch.cameras.tolist()) != set(seen.tolist()) and not _expected(ahead, batch, rig, probability):
+    shut_out = far and set(batch.cameras.tolist()) != set(seen.tolist())
+    if shut_out and not _expected(ahead, batch, rig, probability):
         return Rejected(Reason.FRAME_GATE, "a camera is shut out, and the others see a manoeuvre", ahead.state.t_ns)
     whole = fit(ahead, batch, rig)
     if whole is None:
@@ -155,8 +156,8 @@ def _left_out(sighting: BallSighting, rig: Rig, distance2: float, where: str) ->
 def _posterior(ahead: Prediction, best: Fit) -> State:
     """Take the likeliest state, and the covariance of one linear step there from the prior, by filterpy."""
     prior, step = ahead.state, _linear_step(len(best.P), get_ident())
-    step.x, step.P = np.zeros((len(best.P), 1)), best.P
-    step.update(best.y[:, None], best.R, best.H)
+    step.x, step.P, step.R = np.zeros((len(best.P), 1)), best.P, best.R
+    step.update(best.y[:, None], H=best.H)
     mean, P, noise = settled(
         prior.mean, best.P, ahead.dt, best.H, best.dx, step.P, prior.noise, best.batch.cameras, best.u, best.inverse
     )

@@ -77,6 +77,7 @@ def fit(ahead: Prediction, batch: Batch, rig: Rig, *, adapt: bool = True) -> Fit
     agreed = None if doubtful and _clock_open(batch) else _fitted(ahead, batch, rig, levels, P, R)
     if not doubtful:
         return agreed
+    R = R.copy()
     R[:n, :n] += batch.doubt
     doubted = _fitted(ahead, batch, rig, levels, P, R)
     return _likelier(agreed, doubted)
@@ -135,12 +136,12 @@ def _likelier(agreed: Fit | None, doubted: Fit | None) -> Fit | None:
 
 
 def _fitted(ahead: Prediction, batch: Batch, rig: Rig, levels: Array, P: Array, R: Array) -> Fit | None:
-    """Fit with a given prior covariance P and noise R, which is not kept; None when the fit runs away."""
-    n, R = len(batch.z), R.copy()
+    """Fit with a given prior covariance P and noise R; None when the fit runs away."""
     stands, turn_open, dx, y, H, u, inverse, nis = _solve(ahead, batch, rig, P, R)
     if stands and turn_open:
         bend = _bend(ahead, batch, rig, dx, P, H, R)
         if bend is not None:
+            n, R = len(bend), R.copy()
             R[:n, :n] += bend
             stands, _, dx, y, H, u, inverse, nis = _solve(ahead, batch, rig, P, R)
     return Fit(batch, dx, P, levels, y, H, R, u, inverse, nis) if stands else None

@@ -116,9 +116,12 @@ def pixels(
     """
     n = len(cameras)
     h, H = np.empty(2 * n), np.zeros((2 * n, 23 + len(table)))
-    R, RE, E, J_r = mean[3:12].copy().reshape(3, 3), np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    J, by_theta, by_phi = np.empty((2, 3)), np.empty((2, 3)), np.empty((2, 3))
-    ball_inW, arm, v, w = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
+    small = np.empty((22, 3))  # in one piece: to ask for memory takes as long as to fill it
+    R, RE, E, J_r = small[:3], small[3:6], small[6:9], small[9:12]
+    J, by_theta, by_phi = small[12:14], small[14:16], small[16:18]
+    ball_inW, arm, v, w = small[18], small[19], small[20], small[21]
+    for i in range(3):
+        R[i] = mean[3 + 3 * i : 6 + 3 * i]
     for s in range(n):
         c, m = cameras[s], points_inB[balls[s]]
         tau = lags_s[s] + mean[30 + c]

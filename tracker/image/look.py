@@ -131,7 +131,7 @@ def _find_balls(frame: Frame, rig: Rig, state: State, gaze: Gaze, look: Look) ->
     fixed.flags.writeable = False
     uvs_px, covs_px2 = fixed[:, UV], fixed[:, COV].reshape(-1, 2, 2)
     for b, view in enumerate(rows.tolist()):
-        if not (math.isfinite(view[U]) and math.isfinite(view[V]) and view[DEPTH] >= NEAREST_M):
+        if not (math.isfinite(view[U] + view[V]) and view[DEPTH] >= NEAREST_M):
             look.rejections.append(Rejected(Reason.BEHIND, f"{_name(rig, b)} is not before the camera", t_ns, camera))
             continue
         drawn = serve(b, view, appearance)
