@@ -12,10 +12,10 @@ from tracker.camera import Camera
 from tracker.palette.chroma import chroma, paint_of
 from tracker.palette.spots import Spots
 from tracker.rig import Marker, Rig
-from tracker.start.acquire import CENTROID_SIGMA_PX, MISS_SIGMA
+from tracker.start.acquire import CENTROID_SIGMA_PX
 from tracker.start.associate import SIDE_SIGMA
 from tracker.start.pose3 import pose
-from tracker.start.triangulate import triangulate
+from tracker.start.triangulate import MISS_SIGMA, triangulate
 from tracker.types import Array, Point, Rejected
 
 CAST_SIGMA = 0.35  # of chroma, common to all balls of a camera: gains of 0.8 and 1.2 make 0.4

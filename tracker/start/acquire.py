@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from itertools import combinations, product
+from itertools import combinations
 
 import numpy as np
 
@@ -14,12 +14,11 @@ from tracker.image.detect import Blob
 from tracker.rig import Rig
 from tracker.start.associate import associate
 from tracker.start.pose3 import pose
-from tracker.start.triangulate import triangulate
+from tracker.start.triangulate import MISS_SIGMA, meetings
 from tracker.state import Process, State, start_covariance
 from tracker.types import Array, Frame, Point, Reason, Rejected
 
 CENTROID_SIGMA_PX = 0.7  # of a colour blob's centroid, blur and shading included
-MISS_SIGMA = 4.0
 MAX_CANDIDATES = 8  # per ball and camera, largest first
 TRIGGERED_S = 1e-4  # one sigma of what is left between the clocks of cameras with one trigger
 START_POSITION_M, START_ATTITUDE_RAD = 0.05, 0.3  # broad against the first fit, narrow against the room
@@ -90,27 +89,17 @@ def _clock_sigmas(seen: Seen, rig: Rig, process: Process) -> Array:
 
 
 def _places(ball: int, seen: Seen, rig: Rig, slack_m: float) -> list[Point]:
-    """Return where rays of one ball's colour from two cameras meet, best first.
-
-    They meet when they miss each other by no more than their own uncertainty allows: the epipolar constraint, in
-    metres.
-    """
+    """Return where rays of one ball's colour from two cameras meet, best first."""
     found = []
     rays = {camera: _rays(camera, blobs[ball], rig) for camera, (_, blobs) in seen.items() if blobs[ball]}
     for a, b in combinations(sorted(rays), 2):
         first, second = rig.cameras[a], rig.cameras[b]
-        centres = np.stack((first.p_CinW, second.p_CinW))
         sigma = CENTROID_SIGMA_PX / min(first.focal_px, second.focal_px)
-        for ray_a, ray_b in product(rays[a], rays[b]):
-            point = triangulate(np.stack((ray_a, ray_b)), centres, sigma)
-            if isinstance(point, Rejected):
-                continue
-            if point.miss_m <= slack_m + MISS_SIGMA * float(np.sqrt(np.trace(point.covariance) / 3.0)):
-                found.append(point)
+        found += meetings(rays[a], rays[b], np.stack((first.p_CinW, second.p_CinW)), sigma, slack_m)
     return sorted(found, key=lambda point: point.miss_m)
 
 
 def _rays(camera: int, blobs: Sequence[Blob], rig: Rig) -> Array:
     """Return the bearings (n, 3) in W to the largest blobs."""
     uv_px = np.array([blob.uv_px for blob in blobs[:MAX_CANDIDATES]])
-    return np.asarray(rig.cameras[camera].bearings(uv_px) @ rig.cameras[camera].R_CtoW.T)
+    return np.ascontiguousarray(rig.cameras[camera].bearings(uv_px) @ rig.cameras[camera].R_CtoW.T)

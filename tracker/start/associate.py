@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import combinations, product
 
@@ -42,12 +43,13 @@ def _side_misfit(choice: tuple[Point, ...], marker: Marker, slack_m: float) -> f
     total = 0.0
     for a, b in combinations(range(len(choice)), 2):
         side = choice[a].p_inW - choice[b].p_inW
-        length = float(np.linalg.norm(side))
+        length = math.sqrt(side @ side)
         if length == 0.0:
             return np.inf
         along = side / length
         variance = float(along @ (choice[a].covariance + choice[b].covariance) @ along) + slack_m**2
-        wanted = float(np.linalg.norm(marker.points_inB[a] - marker.points_inB[b]))
+        edge = marker.points_inB[a] - marker.points_inB[b]
+        wanted = math.sqrt(edge @ edge)
         error2 = (length - wanted) ** 2 / variance
         if error2 > SIDE_SIGMA**2:
             return np.inf

@@ -7,6 +7,7 @@ import numpy as np
 from tracker.maths.compiled import compiled
 from tracker.types import Array, Point, Reason, Rejected, frozen_array
 
+MISS_SIGMA = 4.0
 PARALLAX_LIMIT_RAD = float(np.radians(2.0))
 PARALLEL_COSINE = float(np.cos(PARALLAX_LIMIT_RAD))
 
@@ -34,6 +35,28 @@ def triangulate(u_inW: Array, p_CinW: Array, sigma_bearing: float) -> Point | Re
     if least_reach_m <= 0.0:
         return Rejected(Reason.BEHIND, "rays meet behind a camera")
     return Point(frozen_array(place), frozen_array(covariance), miss_m)
+
+
+def meetings(a_inW: Array, b_inW: Array, p_CinW: Array, sigma_bearing: float, slack_m: float) -> list[Point]:
+    """Find where rays of one camera meet rays of another: the epipolar constraint, in metres.
+
+    Args:
+        a_inW, b_inW: (n, 3) and (m, 3) unit bearings from one camera and from the other.
+        p_CinW: (2, 3) the cameras' centres [m].  sigma_bearing: as `triangulate` takes it.
+        slack_m: what rays may miss each other by beyond what their own uncertainty allows [m].
+    Returns:
+        Those of their points that `triangulate` does not reject, and where they miss each other by no more than that.
+    """
+    count = len(a_inW) * len(b_inW)
+    met, places, covariances = np.empty((count, 4)), np.empty((count, 3)), np.empty((count, 3, 3))
+    _met(a_inW, b_inW, p_CinW, sigma_bearing, met, places, covariances)
+    return [
+        Point(frozen_array(place), frozen_array(covariance), miss_m)
+        for (cosine, least_reach_m, miss_m, sigma_m), place, covariance in zip(
+            met.tolist(), places, covariances, strict=True
+        )
+        if cosine <= PARALLEL_COSINE and least_reach_m > 0.0 and miss_m <= slack_m + MISS_SIGMA * sigma_m
+    ]
 
 
 @compiled("void(Array(f8, 2, 'C', readonly=True), Array(f8, 2, 'C', readonly=True), f8, f8[::1], f8[::1], f8[:, ::1])")
@@ -65,3 +88,17 @@ def _nearest(u: Array, c: Array, sigma: float, found: Array, p: Array, covarianc
         spread += sigma * sigma * distance2 * (np.eye(3) - np.outer(u[k], u[k]))
     found[2] = np.sqrt(squares / n)
     covariance[:] = inverse @ spread @ inverse  # (2)
+
+
+@compiled("void(Array(f8, 2, 'C', True), Array(f8, 2, 'C', True), Array(f8, 2, 'C', True), f8, f8[:, ::1], f8[:, ::1],"
+          " f8[:, :, ::1])")  # fmt: skip
+def _met(a: Array, b: Array, c: Array, sigma: float, met: Array, places: Array, covariances: Array) -> None:
+    """Fill in what `_nearest` does for each ray of a with each of b; met (n, 4) has one sigma of the place besides."""
+    pair, k = np.empty((2, 3)), 0
+    for i in range(len(a)):
+        for j in range(len(b)):
+            pair[0], pair[1] = a[i], b[j]
+            covariances[k] = 0.0
+            _nearest(pair, c, sigma, met[k, :3], places[k], covariances[k])
+            met[k, 3] = np.sqrt(np.trace(covariances[k]) / 3.0)
+            k += 1

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.tracker.rigs import ring_rig
-from tracker.start.triangulate import triangulate
+from tracker.start.triangulate import MISS_SIGMA, meetings, triangulate
 from tracker.types import Array, Point, Reason, Rejected
 
 SIGMA_RAD = 5e-4
@@ -107,3 +107,19 @@ def test_two_cameras_in_one_place_are_rejected() -> None:
     point = triangulate(directions(np.array([0.0, 0.0, 1.0]), p_CinW), p_CinW, SIGMA_RAD)
     assert isinstance(point, Rejected)
     assert point.reason is Reason.PARALLAX
+
+
+def test_rays_of_two_cameras_meet_where_each_pair_of_them_is_triangulated() -> None:
+    """Each ray leads to a point of its own; the ray to the last one points the other way."""
+    rng, p_CinW = np.random.default_rng(3), centres(2)
+    a, b = (np.stack([directions(p, p_CinW)[k] for p in rng.uniform(-0.5, 0.5, (6, 3))]) for k in (0, 1))
+    b[-1] *= -1.0
+    pairs = [triangulate(np.stack((u, v)), p_CinW, SIGMA_RAD) for u in a for v in b]
+    points = [point for point in pairs if isinstance(point, Point)]
+    near = [p for p in points if p.miss_m <= 0.1 + MISS_SIGMA * np.sqrt(np.trace(p.covariance) / 3.0)]
+    met = meetings(a, b, p_CinW, SIGMA_RAD, 0.1)
+    assert 0 < len(met) == len(near) < len(points) < len(pairs)
+    for one, other in zip(met, near, strict=True):
+        assert np.array_equal(one.p_inW, other.p_inW)
+        assert np.array_equal(one.covariance, other.covariance)
+        assert one.miss_m == other.miss_m
