@@ -15,7 +15,7 @@ from tracker.image.newton import EVIDENCE, FIT_SIZE, gauss_newton
 from tracker.image.patch import Response, cut_pixels, light_of, trust_of
 from tracker.image.reading import BALL_SIZE, CHROMA_VAR, LUMA_VAR, STREAK_U, STREAK_V
 from tracker.image.reading import RADIUS as BALL_RADIUS
-from tracker.image.spots import find_spots
+from tracker.image.spots import WIDE_PX, find_spots
 from tracker.image.template import MARGIN_PX, STREAK_MAX_PX, Template, variance_of
 from tracker.image.view import RADIUS, S_UU, S_UV, S_VV, SPEED_U, SPEED_V, U, V
 from tracker.maths.compiled import compiled
@@ -97,7 +97,7 @@ def read_ahead(image: Image, room: NDArray[np.float32], views: Array) -> int:
     """Read something of each line of memory that the search for some balls will need.
 
     A frame just taken is in no cache. Here no read waits for another, so memory works on many at once; later each would
-    be waited for.
+    be waited for. A wide region is left to the search, which goes through it row by row.
 
     Args:
         image: (height, width, 3) BGR.  room: what is known to stand behind, empty for nothing.
@@ -111,7 +111,7 @@ def read_ahead(image: Image, room: NDArray[np.float32], views: Array) -> int:
         if not np.isfinite(views[b, U] + views[b, V] + views[b, RADIUS]):
             continue
         left, top, right, bottom = _region(views[b], width, height)
-        for row in range(top, bottom if left < right else top):
+        for row in range(top, bottom if 0 < right - left < WIDE_PX else top):
             first, last = 3 * (row * width + left), 3 * (row * width + right)
             for i in range(first, last, LINE_BYTES):
                 total += pixels[i]

@@ -102,23 +102,30 @@ def _shift_for(lowest_spread: NDArray[np.int16]) -> int:
     return 2
 
 
-@compiled("void(Array(u1, 1, 'C', readonly=True), i8, i8, i8, u1[::1], u1[:, ::1])")
-def _line(
-    pixels: NDArray[np.uint8], start: int, blue_by: int, red_by: int, flat: NDArray[np.uint8], line: NDArray[np.uint8]
-) -> None:
+@compiled("void(Array(u1, 1, 'C', readonly=True), i8, u2[::1], u1[::1])")
+def _line(pixels: NDArray[np.uint8], start: int, undoing: NDArray[np.uint16], line: NDArray[np.uint8]) -> None:
     """Fill in the pixels of a row, the colour of the light undone.
 
-    pixels: of the image, byte by byte, those of the row from `start` on.  flat: the same memory as line.
+    pixels, line: byte by byte, of the image and of the row, which begins at `start`: of two axes each byte would be
+    taken by itself.  undoing: what each byte is multiplied by, in 1 / UNITY; empty for nothing.
     """
-    first = np.uint64(start)
-    for i in range(np.uint64(len(flat))):  # of two axes each byte would be taken by itself
-        flat[i] = pixels[first + i]
-    if blue_by == UNITY and red_by == UNITY:
-        return
-    blue, red, most = np.uint16(blue_by), np.uint16(red_by), np.uint16(LEVELS - 1)
-    for i in range(len(line)):
-        line[i, 0] = min(most, np.uint16(np.uint16(line[i, 0]) * blue // np.uint16(UNITY)))
-        line[i, 2] = min(most, np.uint16(np.uint16(line[i, 2]) * red // np.uint16(UNITY)))
+    first, unity, most = np.uint64(start), np.uint16(UNITY), np.uint16(LEVELS - 1)
+    if len(undoing) == 0:
+        for i in range(np.uint64(len(line))):
+            line[i] = pixels[first + i]
+    else:
+        for i in range(np.uint64(len(line))):
+            line[i] = min(most, np.uint16(np.uint16(pixels[first + i]) * undoing[i] // unity))
+
+
+@compiled("u2[::1](i8, i8, i8)")
+def _undoing(blue: int, red: int, width: int) -> NDArray[np.uint16]:
+    """Return what undoes the colour of the light in a row, see `_line`."""
+    if blue == UNITY and red == UNITY:
+        return np.empty(0, np.uint16)
+    undoing = np.empty((width, 3), np.uint16)
+    undoing[:, 0], undoing[:, 1], undoing[:, 2] = np.uint16(blue), np.uint16(UNITY), np.uint16(red)
+    return undoing.reshape(3 * width)
 
 
 @compiled("void(u1[:, ::1], i8, u1[::1])")
@@ -258,10 +265,11 @@ def find_spots(
     lengths = np.zeros((2, colours), np.int64)
     shift = _shift_for(lowest_spread) if right - left >= WIDE_PX else 0
     line, flags = np.empty((right - left, 3), np.uint8), np.zeros((right - left + 7) // 8 * 8, np.uint8)
-    bytes_of_image, bytes_of_line = image.reshape(image.size), line.reshape(line.size)
+    all_bytes, line_bytes = image.reshape(image.size), line.reshape(line.size)
+    undoing = _undoing(blue, red, right - left)
     for row in range(top, bottom):
         above, here = (row - 1) & 1, row & 1
-        _line(bytes_of_image, (row * image.shape[1] + left) * 3, blue, red, bytes_of_line, line)
+        _line(all_bytes, (row * image.shape[1] + left) * 3, undoing, line_bytes)
         found = _coloured(line, left, lowest_spread, shift, flags, pixels)
         for ball in range(colours):
             length = _runs(pixels, found, least_spread[ball], hues[ball], runs[here, ball])
