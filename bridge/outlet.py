@@ -98,8 +98,8 @@ class Outlet:
             for message in spout.dialogue.due(step.state, now_ns, spout.link.replaced(), self._calibration):
                 spout.link.send(message)
         for estimate in step.estimates:
-            admitted = [spout for spout in self._spouts if spout.dialogue.admits(estimate, now_ns)]
-            going = [(spout.link, spout.dialogue.messages) for spout in admitted]
+            talks = [(spout.link, spout.dialogue) for spout in self._spouts]
+            going = [(link, talk.messages) for link, talk in talks if talk.admits(estimate, now_ns)]
             packed = self._packer.messages(estimate, dict.fromkeys(chain.from_iterable(names for _, names in going)))
             for link, names in going:
                 for name in names:

@@ -131,8 +131,8 @@ class Packer:
 
     def messages(self, estimate: Estimate, names: Iterable[str]) -> dict[str, Message]:
         """Return the messages named (of `MESSAGES`) by name; the turn into NED is done once for all of them."""
-        t_ns, available_ns = estimate.t_ns, estimate.available_ns
-        return {name: Message(name, t_ns, available_ns, _FILL[name](estimate, self._ned(estimate))) for name in names}
+        t_ns, available_ns, ned = estimate.t_ns, estimate.available_ns, self._ned(estimate)
+        return {name: Message(name, t_ns, available_ns, _FILL[name](estimate, ned)) for name in names}
 
     def motion(self, estimate: Estimate) -> tuple[Array, float]:
         """Return the velocity (3,), north-east-down [m/s], and the yaw [rad]."""

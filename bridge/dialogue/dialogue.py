@@ -145,8 +145,10 @@ class Dialogue:
     @property
     def messages(self) -> tuple[str, ...]:
         """The messages an estimate goes out as."""
-        chosen = self.profile.messages if self._terms.messages is None else self._terms.messages
-        return chosen if self.peer is None else kept_apart(chosen, self.peer.autopilot)
+        chosen, peer = self._terms.messages, self.peer
+        if chosen is None:
+            chosen = self.profile.messages
+        return chosen if peer is None else kept_apart(chosen, peer.autopilot)
 
     def take(self, heard: Sequence[Received]) -> None:
         """Take what came in, in its order."""
@@ -172,16 +174,17 @@ class Dialogue:
         if self._beat_due_ns is None or now_ns >= self._beat_due_ns:
             messages.append(heartbeat(now_ns))
             self._beat_due_ns = _next_beat(self._beat_due_ns, now_ns)
-        if self.peer is None:
+        peer = self.peer
+        if peer is None:
             return messages
         request = self._sync.request(now_ns)
         if request is not None:
             messages.append(request)
         if self.profile.needs_origin or self._terms.origin is not None:
-            messages += self._origin.due(self.peer, now_ns)
-        asked = self._streams.due(self.peer, now_ns)
+            messages += self._origin.due(peer, now_ns)
+        asked = self._streams.due(peer, now_ns)
         if asked is None and self._streams.settled:
-            asked = self._heading.due(self.peer, now_ns, self._streams.rate_hz(ATTITUDE))
+            asked = self._heading.due(peer, now_ns, self._streams.rate_hz(ATTITUDE))
         if asked is not None:
             messages.append(asked)
         return messages + self._news.due(self._facts(track, now_ns, calibration), now_ns)
@@ -226,7 +229,7 @@ class Dialogue:
 
     def _holding(self) -> str:
         """Say why poses are held back; an autopilot that can be told its origin is told before the first of them."""
-        waits = self.profile.needs_origin and self._terms.origin is not None and not self._origin.settled
+        waits = self._terms.origin is not None and self.profile.needs_origin and not self._origin.settled
         return f"origin: {self._origin.state}" if waits else ""
 
     def _facts(self, track: TrackState, now_ns: int, calibration: str) -> Facts:

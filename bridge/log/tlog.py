@@ -15,6 +15,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Sequence
 from contextlib import suppress
+from itertools import groupby
 from operator import itemgetter
 from pathlib import Path
 
@@ -76,9 +77,10 @@ class TlogWriter:
         if entry.heard.received:
             heard = [(message.arrived_ns, link, message.raw) for link, message in entry.heard.received]
             frames = sorted(heard + frames, key=itemgetter(0))
-        for t_ns, link, raw in frames:
+        for (t_ns, link), together in groupby(frames, key=itemgetter(0, 1)):
             number = self._numbers.get(link, 0)
-            self._files[number].put(stamp(t_ns + self._wall_less_stream_ns, number) + raw)
+            head = stamp(t_ns + self._wall_less_stream_ns, number)
+            self._files[number].put(b"".join([head + raw for _, _, raw in together]))
 
     def flush(self) -> None:
         """Hand everything to the kernel."""
@@ -107,10 +109,10 @@ class _File:
         self._waiting: list[bytes] = []
         self.error: str | None = None
 
-    def put(self, record: bytes) -> None:
-        """Append a record, unless the file has ended early."""
+    def put(self, records: bytes) -> None:
+        """Append whole records, unless the file has ended early."""
         if self.error is None:
-            self._waiting.append(record)
+            self._waiting.append(records)
 
     def flush(self) -> None:
         """Hand everything to the kernel."""
