@@ -128,38 +128,34 @@ def _undoing(blue: int, red: int, width: int) -> NDArray[np.uint16]:
     return undoing.reshape(3 * width)
 
 
-@compiled("void(u1[:, ::1], i8, u1[::1])")
-def _flag(pixels: NDArray[np.uint8], shift: int, flags: NDArray[np.uint8]) -> None:
-    """Flag the pixels of a row that may have a colour.
+@compiled("void(u1[::1], u1[::1])")
+def _flag(line: NDArray[np.uint8], flags: NDArray[np.uint8]) -> None:
+    """Flag the pixels of a row, byte by byte, that may have a colour.
 
-    The shift is a constant where it can be: then the processor takes many pixels at once.
+    The shift is a constant, as `_shift_for` finds it: so the processor takes many pixels at once.
     """
-    if shift == 2:
-        line, three = pixels.reshape(3 * len(pixels)), np.uint64(3)
-        for i in range(np.uint64(len(pixels))):  # unsigned all through: a sign or a wider number would stop that
-            at = three * np.uint64(i)
-            blue, green, red = line[at], line[at + np.uint64(1)], line[at + np.uint64(2)]
-            most = blue if blue > green else green
-            most = red if red > most else most
-            least = blue if blue < green else green
-            least = red if red < least else least
-            flags[i] = np.uint8(most - least) > np.uint8(most >> np.uint8(2))
-    else:
-        flags[: len(pixels)] = np.uint8(1)
+    three = np.uint64(3)
+    for i in range(np.uint64(len(line) // 3)):  # unsigned all through: a sign or a wider number would stop that
+        at = three * np.uint64(i)
+        blue, green, red = line[at], line[at + np.uint64(1)], line[at + np.uint64(2)]
+        most = blue if blue > green else green
+        most = red if red > most else most
+        least = blue if blue < green else green
+        least = red if red < least else least
+        flags[i] = np.uint8(most - least) > np.uint8(most >> np.uint8(2))
 
 
-@compiled("i8(u1[:, ::1], i8, Array(i2, 1, 'C', readonly=True), i8, u1[::1], i8[:, ::1])")
+@compiled("i8(u1[:, ::1], i8, Array(i2, 1, 'C', readonly=True), u8[::1], i8[:, ::1])")
 def _coloured(
-    line: NDArray[np.uint8], left: int, lowest_spread: NDArray[np.int16], shift: int,
-    flags: NDArray[np.uint8], pixels: NDArray[np.int64],
+    line: NDArray[np.uint8], left: int, lowest_spread: NDArray[np.int16], eights: NDArray[np.uint64],
+    pixels: NDArray[np.int64],
 ) -> int:  # fmt: skip
     """Write column, value, spread and hue of a row's pixels that may have a colour, and return how many they are.
 
     line: the row's pixels (n, 3) from column `left` on.
-    flags: overwritten; a multiple of 8 of them, those beyond the row 0.
+    eights: their flags, eight at a time, those beyond the row 0.
     """
-    _flag(line, shift, flags)
-    found, eights = 0, flags.view(np.uint64)
+    found = 0
     for eight in range(len(eights)):
         if eights[eight] == 0:
             continue
@@ -174,57 +170,56 @@ def _coloured(
     return found
 
 
-@compiled("i8(i8[:, ::1], i8, Array(i2, 1, 'C', readonly=True), Array(b1, 1, 'C', readonly=True), i8[:, ::1])")
+@compiled("i8(i8[:, ::1], i8, Array(i2, 2, 'C', readonly=True), Array(b1, 2, 'C', readonly=True), i8, i8,"
+          " i8[:, :, :, ::1])")  # fmt: skip
 def _runs(
-    pixels: NDArray[np.int64], found: int, least: NDArray[np.int16], hues: NDArray[np.bool_], runs: NDArray[np.int64]
-) -> int:
-    """Write first and last column of each run of pixels of one colour, and return how many they are."""
+    pixels: NDArray[np.int64], found: int, least: NDArray[np.int16], hues: NDArray[np.bool_], ball: int, here: int,
+    runs: NDArray[np.int64],
+) -> int:  # fmt: skip
+    """Write first and last column of each run of pixels of one colour, and return how many they are.
+
+    runs (2, colours, n, 3): of two rows, of which `here` is this one.
+    """
     count = 0
     for k in range(found):
-        if not hues[pixels[k, 3]] or pixels[k, 2] < least[pixels[k, 1]]:
+        if not hues[ball, pixels[k, 3]] or pixels[k, 2] < least[ball, pixels[k, 1]]:
             continue
         column = pixels[k, 0]
-        if count and runs[count - 1, 1] == column - 1:
-            runs[count - 1, 1] = column
+        if count and runs[here, ball, count - 1, 1] == column - 1:
+            runs[here, ball, count - 1, 1] = column
         else:
-            runs[count, 0] = runs[count, 1] = column
+            runs[here, ball, count, 0] = runs[here, ball, count, 1] = column
             count += 1
     return count
 
 
-@compiled("i8(i8[:, ::1], i8, i8, i8, i8[:, ::1], i8, i8[:, ::1], i8)")
+@compiled("i8(i8[:, ::1], i8, i8, i8, i8[:, :, :, ::1], i8[:, ::1])")
 def _link(
-    spots: NDArray[np.int64],
-    count: int,
-    ball: int,
-    row: int,
-    above: NDArray[np.int64],
-    above_count: int,
-    runs: NDArray[np.int64],
-    run_count: int,
+    spots: NDArray[np.int64], count: int, ball: int, row: int, runs: NDArray[np.int64], lengths: NDArray[np.int64]
 ) -> int:
-    """Make each run of a row part of the spots that it touches in the row above, or a new one; return their number."""
-    start = 0
-    for k in range(run_count):
-        first, last = runs[k, 0], runs[k, 1]
+    """Make each run of a row part of the spots that it touches in the row above, or a new one; return their number.
+
+    runs, lengths (2, colours): of the two rows; the third column leads to a run's spot.
+    """
+    above, here, start = (row - 1) & 1, row & 1, 0
+    for k in range(lengths[here, ball]):
+        first, last = runs[here, ball, k, 0], runs[here, ball, k, 1]
         _start(spots, count, ball, first, last, row)
         spot = count
-        while start < above_count and above[start, 1] < first - 1:
+        while start < lengths[above, ball] and runs[above, ball, start, 1] < first - 1:
             start += 1
         other = start
-        while other < above_count and above[other, 0] <= last + 1:
-            spot = _join(spots, spot, above[other, 2])
+        while other < lengths[above, ball] and runs[above, ball, other, 0] <= last + 1:
+            spot = _join(spots, spot, runs[above, ball, other, 2])
             other += 1
-        runs[k, 2] = spot
+        runs[here, ball, k, 2] = spot
         count += 1
     return count
 
 
 @compiled("i8[:, ::1](i8[:, ::1], i8)")
-def _with_room(spots: NDArray[np.int64], needed: int) -> NDArray[np.int64]:
-    """Return the table, or a larger copy when it does not hold so many spots."""
-    if needed <= len(spots):
-        return spots
+def _enlarged(spots: NDArray[np.int64], needed: int) -> NDArray[np.int64]:
+    """Return a copy of the table that holds so many spots, and as many again."""
     larger = np.empty((2 * needed, _COLUMNS), np.int64)
     larger[: len(spots)] = spots
     return larger
@@ -258,25 +253,27 @@ def find_spots(
         (m, 4): index of the colour, centroid u and v in the whole image [px], area [px^2]; largest first.
     Source: run-based labelling with union-find (He, Chao, Suzuki, 2008), all colours in one pass.
     """
-    colours = len(hues)
+    colours, width = len(hues), right - left
     spots, count = np.empty((_FIRST_CAPACITY, _COLUMNS), np.int64), 0
-    pixels = np.empty((right - left, 4), np.int64)
-    runs = np.empty((2, colours, (right - left) // 2 + 1, 3), np.int64)  # of the row above and of this one
+    pixels = np.empty((width, 4), np.int64)
+    runs = np.empty((2, colours, width // 2 + 1, 3), np.int64)  # of the row above and of this one
     lengths = np.zeros((2, colours), np.int64)
-    shift = _shift_for(lowest_spread) if right - left >= WIDE_PX else 0
-    line, flags = np.empty((right - left, 3), np.uint8), np.zeros((right - left + 7) // 8 * 8, np.uint8)
-    all_bytes, line_bytes = image.reshape(image.size), line.reshape(line.size)
-    undoing = _undoing(blue, red, right - left)
+    shift = _shift_for(lowest_spread) if width >= WIDE_PX else 0
+    line, flags = np.empty((width, 3), np.uint8), np.zeros((width + 7) // 8 * 8, np.uint8)
+    flags[:width] = 1
+    # In the loop no part of an array is named: each would be counted, by an instruction that waits for all others.
+    all_bytes, line_bytes, eights = image.reshape(image.size), line.reshape(line.size), flags.view(np.uint64)
+    undoing = _undoing(blue, red, width)
     for row in range(top, bottom):
-        above, here = (row - 1) & 1, row & 1
+        here = row & 1
         _line(all_bytes, (row * image.shape[1] + left) * 3, undoing, line_bytes)
-        found = _coloured(line, left, lowest_spread, shift, flags, pixels)
+        if shift:
+            _flag(line_bytes, flags)
+        found = _coloured(line, left, lowest_spread, eights, pixels)
         for ball in range(colours):
-            length = _runs(pixels, found, least_spread[ball], hues[ball], runs[here, ball])
-            lengths[here, ball] = length
-            if length:
-                spots = _with_room(spots, count + length)
-                count = _link(
-                    spots, count, ball, row, runs[above, ball], lengths[above, ball], runs[here, ball], length
-                )
+            lengths[here, ball] = _runs(pixels, found, least_spread, hues, ball, here, runs)
+            if lengths[here, ball]:
+                if count + lengths[here, ball] > len(spots):
+                    spots = _enlarged(spots, count + lengths[here, ball])
+                count = _link(spots, count, ball, row, runs, lengths)
     return _likely(spots, count, most_px)
