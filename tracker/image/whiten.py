@@ -28,7 +28,7 @@ def colour_at(image: Image, column: int, row: int) -> tuple[float, float, float]
     return luma_blue_red(image[row, column, 0], image[row, column, 1], image[row, column, 2])
 
 
-@compiled("UniTuple(f8, 3)(Array(uint8, 3, 'C', True), Array(f4, 3, 'C'), f8, i8, i8, i8)")
+@compiled("UniTuple(f8, 3)(Array(uint8, 3, 'C', True), Array(f4, 3, 'C'), f8, i8, i8, i8)", inline=True)
 def _colour_of_block(
     image: Image, room: NDArray[np.float32], share: float, left: int, top: int, block: int
 ) -> tuple[float, float, float]:

@@ -20,25 +20,27 @@ REORDER = {"reassoc", "contract"}  # of sums, so that the processor takes severa
 _made_of: dict[object, str] = {}  # by compiled function: a digest of all that its code comes from
 
 
-def compiled(signature: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+def compiled(signature: str, *, inline: bool = False) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """Compile a function for one signature, at once, and keep the code beside the module for the next start.
 
     signature: in Numba's terms, such as "f8(f8[:, ::1], i8)"; a call that does not match it is a TypeError.
+    inline: put its code where compiled code calls it; for what is asked of each pixel, since to hand over an array
+        takes eleven numbers.
     Sums are taken in the order that is fastest, the same at each run of a machine.
     Division by zero gives inf or nan, as NumPy does. Where no folder can be written the code is compiled at each start.
     """
 
     def compile_now(function: Callable[P, R]) -> Callable[P, R]:
         try:
-            return _jit(signature, function, keep=True)
+            return _jit(signature, function, inline, keep=True)
         except RuntimeError:  # Numba found no place for its cache
-            return _jit(signature, function, keep=False)
+            return _jit(signature, function, inline, keep=False)
 
     return compile_now
 
 
-def _jit(signature: str, function: Callable[P, R], *, keep: bool) -> Callable[P, R]:
-    code: Any = numba.njit(fastmath=REORDER, error_model="numpy")(function)
+def _jit(signature: str, function: Callable[P, R], inline: bool, *, keep: bool) -> Callable[P, R]:
+    code: Any = numba.njit(fastmath=REORDER, error_model="numpy", forceinline=inline)(function)
     digest = _digest(function)
     if keep:
         code.enable_caching()
