@@ -51,7 +51,7 @@ def draw_at(
         drawn[p + 2, i] = bare * pixels[Y, i]
 
 
-@compiled("void(f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])")
+@compiled("void(f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])", inline=True)
 def fit_linear(seen: Array, model: Array, weight: Array, weighted: Array, factor: Array, coefficients: Array) -> None:
     """Solve for the linear coefficients of each channel (channels, m).
 
@@ -73,7 +73,7 @@ def fit_linear(seen: Array, model: Array, weight: Array, weighted: Array, factor
         solve(factor, coefficients[channel])
 
 
-@compiled("void(f8[:, ::1], f8[::1], f8[::1], f8[::1])")
+@compiled("void(f8[:, ::1], f8[::1], f8[::1], f8[::1])", inline=True)
 def residual(model: Array, c: Array, seen: Array, rest: Array) -> None:
     """Fill in what the model with coefficients c (m,) leaves of what was seen (n,)."""
     for i in range(len(rest)):
@@ -83,7 +83,7 @@ def residual(model: Array, c: Array, seen: Array, rest: Array) -> None:
             rest[i] -= c[j] * model[j, i]
 
 
-@compiled("void(f8[:, ::1], f8[::1], f8[:, ::1], f8[::1], f8[::1])")
+@compiled("void(f8[:, ::1], f8[::1], f8[:, ::1], f8[::1], f8[::1])", inline=True)
 def slope_of(pixels: Array, room: Array, by: Array, c: Array, slope: Array) -> None:
     """Fill in the slope (n,) of one channel's model with coefficients c (m,), from the shapes' slopes (p, n).
 
@@ -100,7 +100,8 @@ def slope_of(pixels: Array, room: Array, by: Array, c: Array, slope: Array) -> N
 
 @compiled(
     "void(f8[:, ::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], i8, f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1],"
-    "f8[::1], f8[::1])"
+    "f8[::1], f8[::1])",
+    inline=True,
 )
 def _add_channel(
     pixels: Array, seen: Array, drawn: Array, weight: Array, weighted: Array, channel: int, factor: Array, c: Array,
@@ -160,7 +161,7 @@ def _laid_out(sheet: Array, shapes: int, channels: int) -> tuple[Array, Array, A
     return sheet[:work], sheet[work:seen], sheet[seen:tukey], sheet[tukey], sheet[squares]
 
 
-@compiled("void(f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1])")
+@compiled("void(f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[::1])", inline=True)
 def _linearise(
     pixels: Array, drawn: Array, tukey: Array, work: Array, seen: Array, small: Array, squares: Array, normal: Array
 ) -> None:

@@ -224,7 +224,7 @@ def channels_of(pixels: Array) -> int:
     return (len(pixels) - LUMA) // 2
 
 
-@compiled("void(f8[:, ::1], f8[::1], f8[:, ::1])")
+@compiled("void(f8[:, ::1], f8[::1], f8[:, ::1])", inline=True)
 def without_room(pixels: Array, bare: Array, seen: Array) -> None:
     """Fill in what is seen in each channel (channels, n), without the known room where the ball leaves it bare (n,)."""
     channels = len(seen)

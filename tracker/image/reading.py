@@ -24,7 +24,7 @@ def _places_along(streak_u: float, streak_v: float) -> tuple[int, float]:
     return math.ceil(2.0 * length * shrink) | 1, shrink
 
 
-@compiled("i8(Array(float32, 3, 'C', True), i8, i8, f8, f8[::1], f8[:, ::1], f4[:, :, ::1])")
+@compiled("i8(Array(float32, 3, 'C', True), i8, i8, f8, f8[::1], f8[:, ::1], f4[:, :, ::1])", inline=True)
 def _gather(
     fine: NDArray[np.float32], u_steps: int, v_steps: int, per_px: float, ball: Array, pixels: Array,
     sums: NDArray[np.float32],
@@ -62,7 +62,8 @@ def _gather(
 
 @compiled(
     "void(Array(float32, 3, 'C', True), f8[::1], f8[::1], i8, f8, f8, f8[:, ::1],"
-    "f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])"
+    "f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1])",
+    inline=True,
 )
 def read(
     fine: NDArray[np.float32], made: Array, ball: Array, variance: int, u: float, v: float, pixels: Array,

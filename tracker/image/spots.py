@@ -23,7 +23,7 @@ _FIRST_CAPACITY = 64
 WIDE_PX = 64  # rows as long as that are worth a first look at many pixels at once
 
 
-@compiled("i8(i8, i8, i8, i8, i8)")
+@compiled("i8(i8, i8, i8, i8, i8)", inline=True)
 def _hue(blue: int, green: int, red: int, value: int, spread: int) -> int:
     """Return OpenCV's 8-bit hue, 0..179, of a pixel whose largest channel is `value`, its least `spread` below."""
     if value == red:
@@ -36,7 +36,7 @@ def _hue(blue: int, green: int, red: int, value: int, spread: int) -> int:
     return hue if hue >= 0 else hue + HUE_STEPS
 
 
-@compiled("i8(i8[:, ::1], i8)")
+@compiled("i8(i8[:, ::1], i8)", inline=True)
 def _root(spots: NDArray[np.int64], spot: int) -> int:
     """Return the spot that this one has become part of, shortening the way for the next time."""
     while spots[spot, _PARENT] != spot:
@@ -45,7 +45,7 @@ def _root(spots: NDArray[np.int64], spot: int) -> int:
     return spot
 
 
-@compiled("i8(i8[:, ::1], i8, i8)")
+@compiled("i8(i8[:, ::1], i8, i8)", inline=True)
 def _join(spots: NDArray[np.int64], a: int, b: int) -> int:
     """Make two spots one and return it."""
     a, b = _root(spots, a), _root(spots, b)
@@ -62,7 +62,7 @@ def _join(spots: NDArray[np.int64], a: int, b: int) -> int:
     return a
 
 
-@compiled("void(i8[:, ::1], i8, i8, i8, i8, i8)")
+@compiled("void(i8[:, ::1], i8, i8, i8, i8, i8)", inline=True)
 def _start(spots: NDArray[np.int64], spot: int, ball: int, first: int, last: int, row: int) -> None:
     """Start a spot with one run of pixels."""
     length = last - first + 1
@@ -102,7 +102,7 @@ def _shift_for(lowest_spread: NDArray[np.int16]) -> int:
     return 2
 
 
-@compiled("void(Array(u1, 1, 'C', readonly=True), i8, u2[::1], u1[::1])")
+@compiled("void(Array(u1, 1, 'C', readonly=True), i8, u2[::1], u1[::1])", inline=True)
 def _line(pixels: NDArray[np.uint8], start: int, undoing: NDArray[np.uint16], line: NDArray[np.uint8]) -> None:
     """Fill in the pixels of a row, the colour of the light undone.
 
@@ -145,7 +145,7 @@ def _flag(line: NDArray[np.uint8], flags: NDArray[np.uint8]) -> None:
         flags[i] = np.uint8(most - least) > np.uint8(most >> np.uint8(2))
 
 
-@compiled("i8(u1[:, ::1], i8, Array(i2, 1, 'C', readonly=True), u8[::1], i8[:, ::1])")
+@compiled("i8(u1[:, ::1], i8, Array(i2, 1, 'C', readonly=True), u8[::1], i8[:, ::1])", inline=True)
 def _coloured(
     line: NDArray[np.uint8], left: int, lowest_spread: NDArray[np.int16], eights: NDArray[np.uint64],
     pixels: NDArray[np.int64],
@@ -171,7 +171,7 @@ def _coloured(
 
 
 @compiled("i8(i8[:, ::1], i8, Array(i2, 2, 'C', readonly=True), Array(b1, 2, 'C', readonly=True), i8, i8,"
-          " i8[:, :, :, ::1])")  # fmt: skip
+          " i8[:, :, :, ::1])", inline=True)  # fmt: skip
 def _runs(
     pixels: NDArray[np.int64], found: int, least: NDArray[np.int16], hues: NDArray[np.bool_], ball: int, here: int,
     runs: NDArray[np.int64],
@@ -193,7 +193,7 @@ def _runs(
     return count
 
 
-@compiled("i8(i8[:, ::1], i8, i8, i8, i8[:, :, :, ::1], i8[:, ::1])")
+@compiled("i8(i8[:, ::1], i8, i8, i8, i8[:, :, :, ::1], i8[:, ::1])", inline=True)
 def _link(
     spots: NDArray[np.int64], count: int, ball: int, row: int, runs: NDArray[np.int64], lengths: NDArray[np.int64]
 ) -> int:

@@ -19,7 +19,7 @@ def dot(a: Array, b: Array) -> float:
     return total
 
 
-@compiled("void(f8[:, ::1])")
+@compiled("void(f8[:, ::1])", inline=True)
 def cholesky(A: Array) -> None:
     """Turn the lower triangle of a positive definite matrix (m, m) into its Cholesky factor, in place."""
     for j in range(len(A)):
@@ -32,7 +32,7 @@ def cholesky(A: Array) -> None:
             A[i, j] /= A[j, j]
 
 
-@compiled("void(f8[:, ::1], f8[::1])")
+@compiled("void(f8[:, ::1], f8[::1])", inline=True)
 def lower(L: Array, b: Array) -> None:
     """Turn b (m,) into L^-1 b, in place."""
     for j in range(len(L)):
@@ -41,7 +41,7 @@ def lower(L: Array, b: Array) -> None:
         b[j] /= L[j, j]
 
 
-@compiled("void(f8[:, ::1], f8[::1])")
+@compiled("void(f8[:, ::1], f8[::1])", inline=True)
 def solve(L: Array, b: Array) -> None:
     """Turn b (m,) into A^-1 b, in place, with A's Cholesky factor L."""
     lower(L, b)
