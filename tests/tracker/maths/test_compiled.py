@@ -16,7 +16,7 @@ from tracker.maths.compiled import compiled
 STEP = {step}
 
 
-@compiled("i8(i8)")
+@compiled("i8(i8)", inline={inline})
 def more(x):
     return x + {more}
 """
@@ -41,9 +41,9 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
         sys.modules.pop(name, None)
 
 
-def loaded(folder: Path, step: int, more: int) -> ModuleType:
+def loaded(folder: Path, step: int, more: int, *, inline: bool = False) -> ModuleType:
     """Write the callee, and load both as a new start of the program would."""
-    (folder / "kept_callee.py").write_text(CALLEE.format(step=step, more=more))
+    (folder / "kept_callee.py").write_text(CALLEE.format(step=step, more=more, inline=inline))
     importlib.invalidate_caches()
     for name in ("kept_callee", "kept_caller"):
         sys.modules.pop(name, None)
@@ -58,9 +58,10 @@ def test_code_is_kept_for_the_next_start(folder: Path) -> None:
     assert kept == {path: path.stat().st_mtime_ns for path in folder.rglob("kept_caller*.nbc")}
 
 
+@pytest.mark.parametrize("inline", [False, True])
 @pytest.mark.parametrize(("step", "more", "expected"), [(1, 30, 35), (20, 1, 120)])
 def test_a_change_in_another_file_that_the_code_is_made_of_is_noticed(
-    folder: Path, step: int, more: int, expected: int
+    folder: Path, step: int, more: int, expected: int, inline: bool
 ) -> None:
-    assert loaded(folder, 1, 1).result(5) == 6
-    assert loaded(folder, step, more).result(5) == expected
+    assert loaded(folder, 1, 1, inline=inline).result(5) == 6
+    assert loaded(folder, step, more, inline=inline).result(5) == expected
