@@ -24,9 +24,11 @@ from tracker.types import Array, Image
 GAMMAS = (1.0, 1.6, 2.2)
 MOST_GAMMA, BEYOND = 2.8, 0.3  # where the outermost is the best, rivals this far on either side of it are next
 APART = 0.6  # as far on either side of a gamma found lie those that it is tried against once the room is known
-SEARCHING, FOUND, FOUND_BY_ROOM, AT_THE_END = 0.3, 0.15, 0.08, 0.04
-"""One sigma of a gamma: of the best rival, of one that three told, the same by balls behind which the room is known,
-and of 1, where the range ends."""
+SEARCHING = 0.3  # one sigma of a gamma while rivals differ little
+LEAST_DOUBT, MOST_DOUBT = 0.08, 1.0  # of a gamma found
+LEAST_AT_THE_END = 0.04  # of 1, where the range ends
+LEAST_PULL_PX = 0.06  # a unit of gamma: the pull is learned from few balls
+BEND_DOUBT, SLOPE_DOUBT = 0.2, 0.02  # one sigma of a gamma found, times the parabola's bend, or its slope at 1
 ROUND_BALLS, LONG_ROUND_BALLS = 54, 90  # balls that a set of rivals learns from before it is judged: the long round
 CLEAR = 0.25  # where their misfits' logarithms differ by less than this; by chance it is about 0.05
 FIRST_LESSONS, FIRST_BALLS = 4, 12
@@ -39,7 +41,7 @@ class Rivals:
 
     appearances: one a gamma.  misfits: of each, recent mean of the logarithm.  count: balls learned since they were
     set up.  pull_px (2,): recent mean of how far a centre moves with gamma, a unit of it.
-    by_room: whether only balls count, or counted, behind which the room is known.
+    by_room: whether only balls count, or counted, behind which the room is known.  doubt: one sigma of the gamma.
     """
 
     appearances: tuple[Appearance, ...]
@@ -47,18 +49,12 @@ class Rivals:
     count: int
     pull_px: Array
     by_room: bool = False
+    doubt: float = SEARCHING
 
     @property
     def doubt_px(self) -> float:
         """Return by how much, one sigma, all centres may be wrong together since gamma is not known exactly [px]."""
-        gamma = self.best.response.gamma
-        if not self.settled:
-            doubt = SEARCHING
-        elif gamma == GAMMAS[0]:
-            doubt = AT_THE_END
-        else:
-            doubt = FOUND_BY_ROOM if self.by_room else FOUND
-        return doubt * math.hypot(*self.pull_px)
+        return self.doubt * math.hypot(*self.pull_px, LEAST_PULL_PX)
 
     @property
     def best(self) -> Appearance:
@@ -114,18 +110,30 @@ class Rivals:
         gamma = best.response.gamma
         if (gamma == gammas[-1] and gamma < MOST_GAMMA) or (self.by_room and gamma == gammas[0] > GAMMAS[0]):
             return _around(best, BEYOND, self.pull_px, by_room=self.by_room)
-        found = best.with_gamma(_lowest_point(gammas, self.misfits))
-        return Rivals((found,), (0.0,), 0, self.pull_px, self.by_room)
+        gamma, doubt = _lowest_point(gammas, self.misfits)
+        return Rivals((best.with_gamma(gamma),), (0.0,), 0, self.pull_px, self.by_room, doubt)
 
 
-def _lowest_point(gammas: Sequence[float], misfits: Sequence[float]) -> float:
-    """Return where the parabola through three equally spaced points is lowest, within them."""
+def _lowest_point(gammas: Sequence[float], misfits: Sequence[float]) -> tuple[float, float]:
+    """Return where the parabola through three equally spaced points is lowest, within them, and one sigma of it.
+
+    Where JPEG, smear or a small ball hide what gamma does, the parabola is flat, and its lowest point far from the
+    truth; so what is said of it goes with its bend, or with its slope where it is lowest at 1, where the range ends.
+    """
     left, middle, right = misfits
-    bend = left - 2.0 * middle + right
-    if bend <= 0.0:
-        return gammas[0] if left < right else gammas[2]
-    at = gammas[1] + (left - right) / bend * (gammas[1] - gammas[0]) / 2.0
-    return min(gammas[2], max(gammas[0], at))
+    apart, bend = gammas[1] - gammas[0], left - 2.0 * middle + right
+    if bend > 0.0:
+        at = min(gammas[2], max(gammas[0], gammas[1] + (left - right) / bend * apart / 2.0))
+    else:
+        at = gammas[0] if left < right else gammas[2]
+    if at == GAMMAS[0]:
+        return at, _within(LEAST_AT_THE_END, SLOPE_DOUBT, (middle - left) / apart)
+    return at, _within(LEAST_DOUBT, BEND_DOUBT, bend / apart**2)
+
+
+def _within(least: float, doubt: float, per: float) -> float:
+    """Return a doubt divided by what tells against it, no less than that and no more than MOST_DOUBT."""
+    return max(least, min(MOST_DOUBT, doubt / per)) if per > 0.0 else MOST_DOUBT
 
 
 def _around(best: Appearance, apart: float, pull_px: Array, *, by_room: bool) -> Rivals:
@@ -142,4 +150,4 @@ def first_rivals() -> Rivals:
 
 def settled_on(appearance: Appearance) -> Rivals:
     """Return one appearance whose gamma is known."""
-    return Rivals((appearance,), (0.0,), 0, np.zeros(2))
+    return Rivals((appearance,), (0.0,), 0, np.zeros(2), doubt=0.0)

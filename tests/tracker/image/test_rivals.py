@@ -89,6 +89,13 @@ def test_the_better_the_gamma_is_known_the_less_it_may_move_the_centres() -> Non
     assert searching.doubt_px > told.doubt_px > linear.doubt_px > 0.0
 
 
+def test_misfits_that_hardly_bend_tell_less_of_the_gamma() -> None:
+    sharp, flat = judged(1.0, 0.0, 1.0), judged(0.02, 0.0, 0.3)
+    assert sharp.settled
+    assert flat.settled
+    assert flat.doubt > 2.0 * sharp.doubt
+
+
 def test_a_gamma_that_may_be_higher_than_all_rivals_is_looked_for_up_there() -> None:
     assert gammas(judged(4.0, 1.5, 0.2)) == pytest.approx([1.9, 2.2, 2.5])
 
