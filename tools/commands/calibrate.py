@@ -44,7 +44,7 @@ def board(
 
 @calibrate.command()
 def convert(
-    file: Annotated[Path, typer.Argument(help="TOML, Kalibr, ROS, EuRoC or OpenCV; or a folder with mav0.")],
+    file: Annotated[Path, typer.Argument(help="TOML, Kalibr, ROS, EuRoC or OpenCV; or a folder of such.")],
     out: Annotated[Path, typer.Argument(help="The file to write; a folder for several cameras as ROS or EuRoC.")],
     to: Annotated[
         str | None, typer.Option(help="toml, kalibr, ros, euroc or opencv; .toml needs no asking.", metavar="FORMAT")

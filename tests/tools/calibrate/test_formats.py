@@ -80,10 +80,7 @@ def test_a_file_is_the_same_calibration_after_a_way_through_each_format(
     cameras = read(SAMPLES[name], tmp_path / f"in{SUFFIX[name]}")
     path = tmp_path / ("between" if through in ("ros", "euroc") and len(cameras) > 1 else f"between{SUFFIX[through]}")
     lost = write_cameras(cameras, path, through)
-    if path.is_dir() and through is FileFormat.ROS:
-        back = tuple(read_cameras(path / f"{camera.name}.yaml")[0] for camera in cameras)
-    else:
-        back = read_cameras(path)
+    back = read_cameras(path)
     assert len(back) == len(cameras)
     for one, other in zip(cameras, back, strict=True):
         if lost:
@@ -175,6 +172,11 @@ def test_a_file_we_cannot_use_is_one_line_that_names_it(text: str, suffix: str, 
     assert complaint in str(told.value)
     assert str(path) in str(told.value)
     assert "\n" not in str(told.value)
+
+
+def test_a_folder_without_calibrations_is_told(tmp_path: Path) -> None:
+    with pytest.raises(OperatorError, match="holds neither mav0 nor a file"):
+        read_cameras(tmp_path)
 
 
 def test_the_command_converts_and_says_what_is_lost(tmp_path: Path) -> None:

@@ -41,8 +41,7 @@ def read_cameras(path: Path, size_px: Size | None = None) -> tuple[Camera, ...]:
         OperatorError: none that is known, or a model we cannot represent.
     """
     if path.is_dir():
-        folders = camera_folders(find_mav0(path))
-        return tuple(read_camera(folder / "sensor.yaml", folder.name) for folder in folders)
+        return _read_folder(path, size_px)
     if path.suffix == ".toml":
         return read_own(path)
     try:
@@ -50,6 +49,19 @@ def read_cameras(path: Path, size_px: Size | None = None) -> tuple[Camera, ...]:
     except OperatorError as error:
         # A camera's own values are wrong: say in which file.
         raise error if str(path) in str(error) else OperatorError(f"{path}: {error}") from error
+
+
+def _read_folder(path: Path, size_px: Size | None) -> tuple[Camera, ...]:
+    """Read a folder in EuRoC's layout, or one of one camera a file, as ROS has them."""
+    if any((path / name).is_dir() for name in ("mav0", "cam0")):
+        folders = camera_folders(find_mav0(path))
+        return tuple(read_camera(folder / "sensor.yaml", folder.name) for folder in folders)
+    files = sorted(path.rglob("*.yaml"))  # a name such as stereo/left makes a folder of its own
+    if not files:
+        raise OperatorError(
+            f"{path}: holds neither mav0 nor a file NAME.yaml; give a file, or the folder that holds them"
+        )
+    return tuple(camera for file in files for camera in read_cameras(file, size_px))
 
 
 def _read_file(path: Path, size_px: Size | None) -> tuple[Camera, ...]:
