@@ -23,7 +23,7 @@ class Backlog:
         self._batch = max(1, min(BATCH, capacity // 2))  # the loop goes on filling it meanwhile
         self._waiting: deque[Entry] = deque()
         self._wake = threading.Event()
-        self._room = threading.Event()  # not set while somebody waits for it
+        self._room = threading.Event()  # not set once somebody looks for it, until there is some
         self._room.set()
         self._closed = False
 

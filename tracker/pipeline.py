@@ -119,10 +119,11 @@ class Tracker:
 
     def _take_round(self, frames: Round, harvest: Harvest) -> None:
         """Find the vehicle in a round, and see whether the cameras still stand where they did."""
-        first, t_ns = (len(harvest.sightings), len(harvest.refused)), max([frame.t_ns for frame in frames])
+        used_before, refused_before = len(harvest.sightings), len(harvest.refused)
+        t_ns = max([frame.t_ns for frame in frames])
         self._locate(frames, t_ns, harvest)
         state = self._history.newest if self._track is TrackState.TRACKING else None
-        used, refused = harvest.sightings[first[0] :], harvest.refused[first[1] :]
+        used, refused = harvest.sightings[used_before:], harvest.refused[refused_before:]
         health = self._watch.take(frames, used, refused, state, t_ns)
         if health is not None:
             harvest.health = health

@@ -246,12 +246,8 @@ def gauss_newton(
     drawn_c, work_c, seen_c, tukey_c, squares_c = _laid_out(np.empty((_rows_of_sheet(p, 2), n_colour)), p, 2)
     tukey_b[:], tukey_c[:] = 1.0, 1.0
     small, normals = np.empty((p + PLANE + 4, p + PLANE)), np.zeros((OCTANTS + 3, NORMAL))
-    octants, normal_b, normal_c, normal = (
-        normals[:OCTANTS],
-        normals[OCTANTS],
-        normals[OCTANTS + 1],
-        normals[OCTANTS + 2],
-    )
+    octants, normal = normals[:OCTANTS], normals[OCTANTS + 2]
+    normal_b, normal_c = normals[OCTANTS], normals[OCTANTS + 1]
     misfit_b = misfit_c = at_u = at_v = 0.0
     noise_b = noise_c = 1.0
     drawn_u = drawn_v = np.inf  # where the ball is drawn: nowhere yet
