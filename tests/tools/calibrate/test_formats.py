@@ -179,6 +179,15 @@ def test_a_folder_without_calibrations_is_told(tmp_path: Path) -> None:
         read_cameras(tmp_path)
 
 
+def test_two_files_of_cameras_of_one_name_are_refused(tmp_path: Path) -> None:
+    """Written again, one would take the other's place."""
+    for name in ("left", "right"):
+        (tmp_path / f"{name}.yaml").write_text(ROS)
+    with pytest.raises(OperatorError, match="camera narrow_stereo/left comes twice") as told:
+        read_cameras(tmp_path)
+    assert str(tmp_path) in str(told.value)
+
+
 def test_the_command_converts_and_says_what_is_lost(tmp_path: Path) -> None:
     (tmp_path / "camchain.yaml").write_text(KALIBR)
     done = posebridge("calibrate", "convert", tmp_path / "camchain.yaml", tmp_path / "a.toml")

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from enum import StrEnum
 from pathlib import Path
 
+from bridge.settings.section import refuse_twins
 from tools.calibrate.formats.euroc import write_euroc
 from tools.calibrate.formats.fields import read_text, read_yaml
 from tools.calibrate.formats.kalibr import read_kalibr, write_kalibr
@@ -61,7 +62,12 @@ def _read_folder(path: Path, size_px: Size | None) -> tuple[Camera, ...]:
         raise OperatorError(
             f"{path}: holds neither mav0 nor a file NAME.yaml; give a file, or the folder that holds them"
         )
-    return tuple(camera for file in files for camera in read_cameras(file, size_px))
+    cameras = tuple(camera for file in files for camera in read_cameras(file, size_px))
+    try:
+        refuse_twins("camera", [camera.name for camera in cameras])
+    except ValueError as error:
+        raise OperatorError(f"{path}: {error}") from error
+    return cameras
 
 
 def _read_file(path: Path, size_px: Size | None) -> tuple[Camera, ...]:
