@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import numpy as np
 
 from tracker.maths import so3
-from tracker.types import Array
+from tracker.types import Array, frozen_array
 
 POSITION, ATTITUDE, VELOCITY, RATE = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
 ACCELERATION, ANGULAR_ACCELERATION = slice(12, 15), slice(15, 18)
@@ -40,51 +41,103 @@ class Process:
     pixel_noise_px: float
 
 
+STILL = frozen_array(np.zeros(3))
+FIRST_CLOCK = frozen_array(np.zeros(1))  # the offset of a single camera's
+_PARTS = MappingProxyType(
+    {
+        "p_BinW": slice(0, 3), "R_BtoW": slice(3, 12), "v_BinW": slice(12, 15), "w_BinB": slice(15, 18),
+        "a_BinW": slice(18, 21), "alpha_BinB": slice(21, 24), "j_BinW": slice(24, 27), "beta_BinB": slice(27, 30),
+        "offsets_s": slice(30, None),
+    }
+)  # fmt: skip
+"""Where each part stands in `State.mean`, the attitude by rows."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class State:
     """Nominal state, covariance, and what was learned of manoeuvres and pixels on the way, at t_ns.
 
-    p_BinW (3,) [m], R_BtoW (3, 3), v_BinW (3,) [m/s], w_BinB (3,) [rad/s]; P (n, n) of the errors in the order
-    position (W), rotation vector (B, R = R_hat exp(theta)), velocity (W), rate (B), acceleration (W), angular
-    acceleration (B), jerk (W), angular jerk (B), clock offsets of cameras 1, 2, ...; n = 23 + cameras.
-    a_BinW (3,) [m/s^2], alpha_BinB (3,) [rad/s^2], j_BinW (3,) [m/s^3], beta_BinB (3,) [rad/s^3].
-    offsets_s: (cameras,) a frame stamped t shows the vehicle at t + offset; camera 0's clock counts, so its is 0 [s].
+    mean: (30 + cameras,) the nominal state as one vector, as compiled code takes it; only to be read. Its parts are
+        p_BinW (3,) [m], R_BtoW (3, 3) by rows, v_BinW (3,) [m/s], w_BinB (3,) [rad/s], a_BinW (3,) [m/s^2],
+        alpha_BinB (3,) [rad/s^2], j_BinW (3,) [m/s^3], beta_BinB (3,) [rad/s^3], offsets_s (cameras,) [s].
+    P: (n, n) of the errors in the order position (W), rotation vector (B, R = R_hat exp(theta)), velocity (W), rate
+        (B), acceleration (W), angular acceleration (B), jerk (W), angular jerk (B), clock offsets of cameras 1, 2, ...;
+        n = 23 + cameras.
     levels: (2, levels) probability of each level of `manoeuvre`, for translation and for rotation.
     noise: (cameras, 2) variance that a camera adds to each fit, and how much is known of it, see `noise`.
     manoeuvre_s: how long an acceleration lasts [s].
     """
 
     t_ns: int
-    p_BinW: Array
-    R_BtoW: Array
-    v_BinW: Array
-    w_BinB: Array
+    mean: Array
     P: Array
-    a_BinW: Array = field(default_factory=lambda: np.zeros(3))
-    alpha_BinB: Array = field(default_factory=lambda: np.zeros(3))
-    j_BinW: Array = field(default_factory=lambda: np.zeros(3))
-    beta_BinB: Array = field(default_factory=lambda: np.zeros(3))
-    offsets_s: Array = field(default_factory=lambda: np.zeros(1))
     levels: Array = field(default_factory=lambda: np.ones((2, 1)))
     noise: Array = field(default_factory=lambda: np.zeros((1, 2)))
     manoeuvre_s: float = 1.0
 
+    @property
+    def p_BinW(self) -> Array:
+        """Return the body's place (3,) [m]."""
+        return self.mean[0:3]
+
+    @property
+    def R_BtoW(self) -> Array:
+        """Return the attitude (3, 3)."""
+        return self.mean[3:12].reshape(3, 3)
+
+    @property
+    def v_BinW(self) -> Array:
+        """Return the velocity (3,) [m/s]."""
+        return self.mean[12:15]
+
+    @property
+    def w_BinB(self) -> Array:
+        """Return the angular rate (3,) [rad/s]."""
+        return self.mean[15:18]
+
+    @property
+    def a_BinW(self) -> Array:
+        """Return the acceleration (3,) [m/s^2]."""
+        return self.mean[18:21]
+
+    @property
+    def alpha_BinB(self) -> Array:
+        """Return the angular acceleration (3,) [rad/s^2]."""
+        return self.mean[21:24]
+
+    @property
+    def j_BinW(self) -> Array:
+        """Return the jerk (3,) [m/s^3]."""
+        return self.mean[24:27]
+
+    @property
+    def beta_BinB(self) -> Array:
+        """Return the angular jerk (3,) [rad/s^3]."""
+        return self.mean[27:30]
+
+    @property
+    def offsets_s(self) -> Array:
+        """Return the clock offsets (cameras,): a frame stamped t shows the vehicle at t + offset [s].
+
+        Camera 0's clock counts, so its offset is 0.
+        """
+        return self.mean[30:]
+
     def moved(self, dx: Array) -> State:
         """Return the state with the error dx (n,) put in; the covariance stays as it is."""
-        offsets_s = self.offsets_s.copy()
-        offsets_s[1:] += dx[OFFSETS:]
-        return replace(
-            self,
-            p_BinW=self.p_BinW + dx[POSITION],
-            R_BtoW=self.R_BtoW @ so3.exp(dx[ATTITUDE]),
-            v_BinW=self.v_BinW + dx[VELOCITY],
-            w_BinB=self.w_BinB + dx[RATE],
-            a_BinW=self.a_BinW + dx[ACCELERATION],
-            alpha_BinB=self.alpha_BinB + dx[ANGULAR_ACCELERATION],
-            j_BinW=self.j_BinW + dx[JERK],
-            beta_BinB=self.beta_BinB + dx[ANGULAR_JERK],
-            offsets_s=offsets_s,
-        )
+        mean = self.mean.copy()
+        mean[:3] += dx[POSITION]
+        mean[3:12] = (self.R_BtoW @ so3.exp(dx[ATTITUDE])).reshape(9)
+        mean[12:30] += dx[VELOCITY.start : OFFSETS]
+        mean[31:] += dx[OFFSETS:]
+        return replace(self, mean=mean)
+
+    def with_parts(self, **parts: Array) -> State:
+        """Return the state with other parts of its mean, by their names."""
+        mean = self.mean.copy()
+        for name, part in parts.items():
+            mean[_PARTS[name]] = part.reshape(-1)
+        return replace(self, mean=mean)
 
     def with_clocks_open(self, breaks_s: Mapping[int, float]) -> State:
         """Return the state less sure of the clock offsets of some cameras, by one sigma of each [s].
@@ -103,54 +156,14 @@ class State:
         P = self.P.copy()
         P[OFFSETS:], P[:, OFFSETS:] = 0.0, 0.0
         P[OFFSETS:, OFFSETS:] = covariance_s2
-        return replace(self, P=P, offsets_s=offsets_s)
+        return replace(self.with_parts(offsets_s=offsets_s), P=P)
 
-    @property
-    def mean(self) -> Array:
-        """Return the nominal state as one vector, for compiled code: p, R by rows, v, w, a, alpha, j, beta, offsets.
 
-        Only to be read: it is the vector that `at_mean` was given, if the state's parts are still parts of that.
-        """
-        whole = self.p_BinW.base
-        if (
-            whole is not None
-            and self.R_BtoW.base is whole
-            and self.v_BinW.base is whole
-            and self.w_BinB.base is whole
-            and self.a_BinW.base is whole
-            and self.alpha_BinB.base is whole
-            and self.j_BinW.base is whole
-            and self.beta_BinB.base is whole
-            and self.offsets_s.base is whole
-        ):
-            return whole
-        parts = (
-            self.p_BinW, self.R_BtoW, self.v_BinW, self.w_BinB, self.a_BinW, self.alpha_BinB, self.j_BinW,
-            self.beta_BinB, self.offsets_s,
-        )  # fmt: skip
-        return np.concatenate([part.reshape(-1) for part in parts])
-
-    def with_mean(self, mean: Array) -> State:
-        """Return the state with another nominal state, as `mean` gives it."""
-        return replace(
-            self,
-            p_BinW=mean[0:3],
-            R_BtoW=mean[3:12].reshape(3, 3),
-            v_BinW=mean[12:15],
-            w_BinB=mean[15:18],
-            a_BinW=mean[18:21],
-            alpha_BinB=mean[21:24],
-            j_BinW=mean[24:27],
-            beta_BinB=mean[27:30],
-            offsets_s=mean[30:],
-        )
-
-    def at_mean(self, t_ns: int, mean: Array, P: Array, levels: Array, noise: Array) -> State:
-        """Return the state of t_ns, with all that an update may change; quicker than `dataclasses.replace`."""
-        return State(
-            t_ns, mean[0:3], mean[3:12].reshape(3, 3), mean[12:15], mean[15:18], P, mean[18:21], mean[21:24],
-            mean[24:27], mean[27:30], mean[30:], levels, noise, self.manoeuvre_s,
-        )  # fmt: skip
+def mean_of(
+    p_BinW: Array, R_BtoW: Array, v_BinW: Array = STILL, w_BinB: Array = STILL, offsets_s: Array = FIRST_CLOCK
+) -> Array:
+    """Return the `State.mean` of a vehicle that keeps its velocity and its rate; arguments as the parts there."""
+    return np.concatenate((p_BinW, R_BtoW.reshape(9), v_BinW, w_BinB, np.zeros(12), offsets_s))
 
 
 def start_covariance(process: Process, offsets_s: Array, position_m: float, attitude_rad: float) -> Array:

@@ -13,7 +13,7 @@ from tracker.filter.manoeuvre import start_levels
 from tracker.filter.noise import start_noise
 from tracker.maths import so3
 from tracker.rig import Ball, Marker, Rig, make_marker, make_rig
-from tracker.state import ATTITUDE, POSITION, RATE, VELOCITY, Process, State
+from tracker.state import ATTITUDE, POSITION, RATE, VELOCITY, Process, State, mean_of
 from tracker.tuning import Tuning
 from tracker.types import Array, BallSighting, frozen_array
 
@@ -59,16 +59,15 @@ def state(
     v_BinW: Iterable[float] = (0.0, 0.0, 0.0),
     w_BinB: Iterable[float] = (0.0, 0.0, 0.0),
     P: Array | None = None,
+    cameras: int = 2,
 ) -> State:
     """Return a state; its covariance is that of a track that has settled unless told otherwise."""
+    R_BtoW = so3.from_euler(*np.radians(tuple(euler_deg)))
+    place, speed, rate = (np.array(tuple(part)) for part in (p_BinW, v_BinW, w_BinB))
     return State(
         t_ns,
-        np.array(tuple(p_BinW)),
-        so3.from_euler(*np.radians(tuple(euler_deg))),
-        np.array(tuple(v_BinW)),
-        np.array(tuple(w_BinB)),
+        mean_of(place, R_BtoW, speed, rate, np.zeros(cameras)),
         covariance(0.002, 0.02, 0.1, 0.5) if P is None else P,
-        offsets_s=np.zeros(2),
         levels=start_levels(),
         noise=start_noise(2, 0.0001),
         manoeuvre_s=PROCESS.manoeuvre_s,
@@ -85,7 +84,8 @@ def at(truth: State, t_ns: int) -> State:
     """Carry a state to t_ns at constant velocity and body rate, by scipy's rotations."""
     dt = (t_ns - truth.t_ns) * 1e-9
     turn = Rotation.from_rotvec(dt * truth.w_BinB).as_matrix()
-    return replace(truth, t_ns=t_ns, p_BinW=truth.p_BinW + dt * truth.v_BinW, R_BtoW=truth.R_BtoW @ turn)
+    there = truth.with_parts(p_BinW=truth.p_BinW + dt * truth.v_BinW, R_BtoW=truth.R_BtoW @ turn)
+    return replace(there, t_ns=t_ns)
 
 
 def seen_px(truth: State, rig: Rig, camera: int, t_ns: int) -> Array:
@@ -119,8 +119,7 @@ def difference(truth: State, guess: State) -> Array:
 
 def perturbed(truth: State, error: Array) -> State:
     """Put an error, of which the first 12 count, into a state, by scipy's rotations."""
-    return replace(
-        truth,
+    return truth.with_parts(
         p_BinW=truth.p_BinW + error[POSITION],
         R_BtoW=truth.R_BtoW @ Rotation.from_rotvec(error[ATTITUDE]).as_matrix(),
         v_BinW=truth.v_BinW + error[VELOCITY],

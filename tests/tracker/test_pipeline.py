@@ -13,7 +13,7 @@ from tests.tracker.drawing import frame
 from tests.tracker.rigs import TUNING, at, difference, ring_rig, state
 from tracker.pipeline import Tracker
 from tracker.rig import Rig, make_rig
-from tracker.state import State
+from tracker.state import State, mean_of
 from tracker.types import Estimate, Event, Frame, Reason, Rejected, Silence, Step, TrackState
 
 RIG = ring_rig(2)
@@ -51,7 +51,8 @@ def reasons(steps: Iterable[Step]) -> list[Reason]:
 
 
 def as_state(estimate: Estimate) -> State:
-    return State(estimate.t_ns, estimate.p_BinW, estimate.R_BtoW, estimate.v_BinW, estimate.w_BinB, estimate.covariance)
+    mean = mean_of(estimate.p_BinW, estimate.R_BtoW, estimate.v_BinW, estimate.w_BinB)
+    return State(estimate.t_ns, mean, estimate.covariance)
 
 
 def test_a_pair_of_frames_gives_an_estimate_at_its_own_time_where_the_vehicle_is() -> None:

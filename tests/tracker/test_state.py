@@ -38,11 +38,11 @@ def test_the_transition_is_that_of_finite_differences(
     euler: Array, v: Array, w: Array, a: Array, alpha: Array, dt: float
 ) -> None:
     step = 1e-5
-    start = replace(state(0, euler_deg=30.0 * euler, v_BinW=v, w_BinB=2.0 * w), a_BinW=3.0 * a, alpha_BinB=5.0 * alpha)
-    start = replace(start, j_BinW=9.0 * v, beta_BinB=20.0 * w)
+    start = state(0, euler_deg=30.0 * euler, v_BinW=v, w_BinB=2.0 * w)
+    start = start.with_parts(a_BinW=3.0 * a, alpha_BinB=5.0 * alpha, j_BinW=9.0 * v, beta_BinB=20.0 * w)
 
     def then(error: Array) -> State:
-        return start.with_mean(carried(start.moved(error).mean, dt, T, 25)[0])
+        return replace(start, mean=carried(start.moved(error).mean, dt, T, 25)[0])
 
     columns = [error_of(then(step * e), then(-step * e)) / (2.0 * step) for e in np.eye(25)]
     assert np.allclose(carried(start.mean, dt, T, 25)[1], np.column_stack(columns), atol=1e-6)
@@ -81,7 +81,7 @@ def test_a_smooth_acceleration_is_as_strong_after_a_while_as_it_was() -> None:
 
 
 def test_a_prediction_carries_the_state_and_grows_its_covariance() -> None:
-    start = replace(state(0, v_BinW=(1.0, 0.0, 0.0)), a_BinW=np.array([0.0, 2.0, 0.0]))
+    start = state(0, v_BinW=(1.0, 0.0, 0.0)).with_parts(a_BinW=np.array([0.0, 2.0, 0.0]))
     ahead = predict(start, SECOND_NS // 10, PROCESS).state
     assert ahead.p_BinW[0] == pytest.approx(0.1)
     assert 0.8 * 0.01 < ahead.p_BinW[1] < 0.01
@@ -98,7 +98,7 @@ def test_an_error_put_in_is_the_one_that_is_found(theta: Array, v: Array, w: Arr
 
 def test_the_vector_of_a_state_shows_a_part_that_was_replaced() -> None:
     carried_on = predict(state(0, v_BinW=np.array([1.0, 2.0, 3.0])), SECOND_NS // 10, PROCESS).state
-    turned_back = replace(carried_on, v_BinW=-carried_on.v_BinW)
+    turned_back = carried_on.with_parts(v_BinW=-carried_on.v_BinW)
     assert carried_on.mean[12:15].tolist() == carried_on.v_BinW.tolist()
     assert turned_back.mean[12:15].tolist() == (-carried_on.v_BinW).tolist()
     assert turned_back.mean[:12].tolist() == carried_on.mean[:12].tolist()

@@ -14,7 +14,7 @@ from tools.bench.profile import TERMS, Disc, columns, draw
 from tracker.filter.measure import predicted_pixels
 from tracker.rig import Rig
 from tracker.sources.groundtruth import GroundTruth
-from tracker.state import ATTITUDE, POSITION, State
+from tracker.state import ATTITUDE, POSITION, State, mean_of
 from tracker.types import Array, Frame, Image
 
 MARGIN_PX = 4
@@ -119,7 +119,7 @@ def pose_bounds(bounds: dict[Key, Array], rig: Rig, truth: GroundTruth) -> dict[
     for k, t_ns in enumerate(truth.t_ns.tolist()):
         keys = [key for key in bounds if key[0] == t_ns]
         if len(keys) >= 3:
-            there = State(t_ns, truth.p_BinW[k], truth.R_BtoW[k], np.zeros(3), np.zeros(3), np.eye(12))
+            there = State(t_ns, mean_of(truth.p_BinW[k], truth.R_BtoW[k]), np.eye(12))
             H = [predicted_pixels(there, rig, camera, t_ns)[1] for camera in range(len(rig.cameras))]
             J = np.stack([np.concatenate((H[c][b][:, POSITION], H[c][b][:, ATTITUDE]), axis=1) for _, c, b in keys])
             result[t_ns] = pose_bound(J, np.stack([bounds[key] for key in keys]))

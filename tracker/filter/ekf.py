@@ -161,7 +161,7 @@ def _posterior(ahead: Prediction, best: Fit) -> State:
     mean, P, noise = settled(
         prior.mean, best.P, ahead.dt, best.H, best.dx, step.P, prior.noise, best.batch.cameras, best.u, best.inverse
     )
-    return prior.at_mean(prior.t_ns, mean, P, best.levels, noise)
+    return State(prior.t_ns, mean, P, best.levels, noise, prior.manoeuvre_s)
 
 
 @lru_cache(maxsize=8)

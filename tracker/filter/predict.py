@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -49,7 +50,7 @@ class Prediction(NamedTuple):
         if not self.turn_open:
             return self
         mean, P, P_coasted = _told_of(self.state.mean, self.pivot_inB, self.state.P, self.P_coasted)
-        state = self.state.at_mean(self.state.t_ns, mean, P, self.state.levels, self.state.noise)
+        state = replace(self.state, mean=mean, P=P)
         return Prediction(state, P_coasted, self.dt, self.process, self.pivot_inB)
 
 
@@ -63,7 +64,7 @@ def predict(state: State, t_ns: int, process: Process) -> Prediction:
     mean, P_coasted, P, levels, pivot_inB, turn_open = _ahead(
         state.mean, state.P, state.levels, of, dt, process.manoeuvre_s, walk
     )  # fmt: skip
-    ahead = state.at_mean(t_ns, mean, P, levels, state.noise)
+    ahead = State(t_ns, mean, P, levels, state.noise, state.manoeuvre_s)
     return Prediction(ahead, P_coasted, dt, process, pivot_inB if turn_open else ORIGIN)
 
 
@@ -131,4 +132,4 @@ def at_origin(state: State, pivot_inB: Array) -> State:
     if pivot_inB is ORIGIN:
         return state
     mean, P, _ = _told_of(state.mean, -pivot_inB, state.P, state.P)
-    return state.at_mean(state.t_ns, mean, P, state.levels, state.noise)
+    return replace(state, mean=mean, P=P)

@@ -15,7 +15,7 @@ from tracker.rig import Rig
 from tracker.start.associate import associate
 from tracker.start.pose3 import pose
 from tracker.start.triangulate import MISS_SIGMA, meetings
-from tracker.state import Process, State, start_covariance
+from tracker.state import Process, State, mean_of, start_covariance
 from tracker.types import Array, Frame, Point, Reason, Rejected
 
 CENTROID_SIGMA_PX = 0.7  # of a colour blob's centroid, blur and shading included
@@ -57,12 +57,8 @@ def first_state(seen: Seen, rig: Rig, process: Process) -> State | Rejected:
             return Rejected(Reason.GEOMETRY, detail, newest_ns)
     return State(
         newest_ns,
-        p_BinW,
-        R_BtoW,
-        v_BinW=np.zeros(3),
-        w_BinB=np.zeros(3),
-        P=start_covariance(process, _clock_sigmas(seen, rig, process), START_POSITION_M + slack_m, START_ATTITUDE_RAD),
-        offsets_s=np.zeros(len(rig.cameras)),
+        mean_of(p_BinW, R_BtoW, offsets_s=np.zeros(len(rig.cameras))),
+        start_covariance(process, _clock_sigmas(seen, rig, process), START_POSITION_M + slack_m, START_ATTITUDE_RAD),
         levels=start_levels(),
         noise=start_noise(len(rig.cameras), process.pixel_noise_px),
         manoeuvre_s=process.manoeuvre_s,

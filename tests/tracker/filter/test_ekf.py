@@ -119,7 +119,7 @@ def test_one_camera_does_not_carry_a_track_out_of_the_envelope_alone() -> None:
     across_inW, _, along_inW = RIG.cameras[0].R_CtoW.T
     sigma_m = np.sqrt(along_inW @ (ahead.P_coasted + BRISKEST)[:3, :3] @ along_inW)
     jump_inW = sigma_m * (3.0 * across_inW + 4.3 * along_inW)
-    jumped = replace(ahead.state, p_BinW=ahead.state.p_BinW + jump_inW)
+    jumped = ahead.state.with_parts(p_BinW=ahead.state.p_BinW + jump_inW)
     seen = sightings(jumped, RIG, [(0, PERIOD_NS), (1, PERIOD_NS)], SIGMA_PX)
     near = [distance2 < chi2.ppf(GATE, 2) for distance2 in make_batch(ahead, seen, RIG).distances2()]
     assert near == [sighting.camera == 0 for sighting in seen]
@@ -169,7 +169,7 @@ def test_a_lie_is_found_by_the_markers_shape_when_the_track_itself_is_vague(inde
 def test_a_camera_that_shows_what_it_saw_before_makes_no_pose_wrong(stale: int, seed: int) -> None:
     """Its balls keep the marker's shape; two of them left out, the third would pull the pose to between the cameras."""
     rng, period_ns = np.random.default_rng(seed), 2 * PERIOD_NS
-    truth = replace(FLYING, v_BinW=rng.uniform(-0.8, 0.8, 3), w_BinB=rng.uniform(-1.0, 1.0, 3))
+    truth = FLYING.with_parts(v_BinW=rng.uniform(-0.8, 0.8, 3), w_BinB=rng.uniform(-1.0, 1.0, 3))
     guess = replace(truth, P=covariance(0.001, 0.01, 0.05, 0.2))
     for k in range(1, 16):
         seen = sightings(truth, RIG, [(0, k * period_ns), (1, k * period_ns)], SIGMA_PX, rng)
@@ -219,7 +219,7 @@ def test_the_iterated_update_beats_the_single_linear_step_for_a_poor_prior(seed:
     rng = np.random.default_rng(seed)
     turn, shift = (v / np.linalg.norm(v) for v in rng.normal(size=(2, 3)))
     error = np.concatenate((0.05 * shift, np.radians(10.0) * turn, np.zeros(6)))
-    start = replace(perturbed(FLYING, error), P=AT_FIRST_SIGHT, v_BinW=FLYING.v_BinW, w_BinB=FLYING.w_BinB)
+    start = replace(perturbed(FLYING, error), P=AT_FIRST_SIGHT)
     seen = sightings(FLYING, RIG, [(0, 0), (1, 0)], SIGMA_PX)
     iterated = updated(update(start, seen, RIG, OPEN)).state
     single = single_step(start, seen)
@@ -252,7 +252,7 @@ def test_the_update_is_the_most_likely_state_between_prior_and_pixels(seed: int)
         """Put an error in; rates are told as the room sees them, which is how the filter's prior speaks of them."""
         turn = Rotation.from_rotvec(error[3:6]).as_matrix()
         w_BinB = turn.T @ (start.w_BinB + error[9:12] + np.cross(error[3:6], start.w_BinB))
-        return replace(perturbed(start, error), w_BinB=w_BinB)
+        return perturbed(start, error).with_parts(w_BinB=w_BinB)
 
     def misfit(scaled: Array) -> Array:
         guess = sightings(put_in(scaled * root), RIG, [(0, 0), (1, 30_000_000)], sigma_px)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ from tracker.filter.manoeuvre import start_levels
 from tracker.filter.noise import start_noise
 from tracker.filter.predict import first_guess, predict
 from tracker.sources.paths import PATHS, PathFunction
-from tracker.state import OFFSETS, State, start_covariance
+from tracker.state import OFFSETS, State, mean_of, start_covariance
 from tracker.types import Array, BallSighting, frozen_array
 
 RIG = ring_rig(2)
@@ -49,7 +49,7 @@ def truth_at(path: PathFunction, t_s: float) -> State:
     step = 1e-4
     (p, R), (before, turned), (after, turning) = path(t_s), path(t_s - step), path(t_s + step)
     w_BinB = Rotation.from_matrix(turned.T @ turning).as_rotvec() / (2.0 * step)
-    return State(round(t_s * 1e9), p, R, (after - before) / (2.0 * step), w_BinB, np.eye(12))
+    return State(round(t_s * 1e9), mean_of(p, R, (after - before) / (2.0 * step), w_BinB), np.eye(12))
 
 
 def seen(path: PathFunction, camera: int, t_s: float, stamp_ns: int, rng: np.random.Generator) -> list[BallSighting]:
@@ -93,10 +93,10 @@ def first(truth: State, rng: np.random.Generator) -> State:
     """Return a first guess near the truth, as whole frames give it."""
     rough = perturbed(truth, rng.normal(size=12) * np.repeat([0.001, 0.01, 0.0, 0.0], 3))
     offset_s = np.full(1, PROCESS.clock_offset_s)
-    return replace(
-        rough, v_BinW=np.zeros(3), w_BinB=np.zeros(3), P=start_covariance(PROCESS, offset_s, 0.05, 0.3),
-        offsets_s=np.zeros(2), levels=start_levels(), noise=start_noise(2, PROCESS.pixel_noise_px),
-        manoeuvre_s=PROCESS.manoeuvre_s,
+    return State(
+        rough.t_ns, mean_of(rough.p_BinW, rough.R_BtoW, offsets_s=np.zeros(2)),
+        start_covariance(PROCESS, offset_s, 0.05, 0.3), start_levels(), start_noise(2, PROCESS.pixel_noise_px),
+        PROCESS.manoeuvre_s,
     )  # fmt: skip
 
 

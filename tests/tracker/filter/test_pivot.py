@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tests.tracker.rigs import PROCESS, covariance, difference, perturbed, ring_rig, sightings, state
+from tests.tracker.rigs import PROCESS, covariance, difference, ring_rig, sightings, state
 from tracker.filter.batch import make_batch
 from tracker.filter.correction import moved, moved_slope
 from tracker.filter.pivot import best_known, moved_to
@@ -19,8 +19,8 @@ from tracker.types import Array
 
 RIG = ring_rig(2)
 POINT = np.array([0.03, -0.02, 0.04])
-FLYING = replace(
-    state(0, (0.2, -0.1, 0.1), (12.0, -8.0, 130.0), (1.0, -0.5, 0.3), (0.4, -0.8, 1.5)),
+STEADY = state(0, (0.2, -0.1, 0.1), (12.0, -8.0, 130.0), (1.0, -0.5, 0.3), (0.4, -0.8, 1.5))
+FLYING = STEADY.with_parts(
     a_BinW=np.array([3.0, -2.0, 1.0]),
     alpha_BinB=np.array([5.0, 4.0, -6.0]),
     j_BinW=np.array([20.0, 10.0, -30.0]),
@@ -117,11 +117,11 @@ def test_the_slope_through_a_step_agrees_with_finite_differences() -> None:
     E, J_r = np.empty((3, 3)), np.empty((3, 3))
     now = moved(FLYING.mean, step, E, J_r)
     G = moved_slope(FLYING.mean, now, E, J_r, 25)
-    here = FLYING.with_mean(now)
+    here = replace(FLYING, mean=now)
     for k in range(24):
         nudged = step.copy()
         nudged[k] += 1e-6
-        there = FLYING.with_mean(moved(FLYING.mean, nudged, np.empty((3, 3)), np.empty((3, 3))))
+        there = replace(FLYING, mean=moved(FLYING.mean, nudged, np.empty((3, 3)), np.empty((3, 3))))
         found = np.concatenate(
             (
                 difference(there, here),
@@ -139,7 +139,7 @@ def test_a_turn_of_the_estimate_leaves_its_motion_in_the_room_alone() -> None:
     turn = np.concatenate((np.zeros(3), np.radians([30.0, -20.0, 40.0]), np.zeros(19)))
     for rate, rows in ((FLYING.w_BinB, slice(9, 12)), (FLYING.alpha_BinB, slice(15, 18))):
         turn[rows] = np.cross(rate, turn[3:6])
-    now = FLYING.with_mean(moved(FLYING.mean, turn, np.empty((3, 3)), np.empty((3, 3))))
+    now = replace(FLYING, mean=moved(FLYING.mean, turn, np.empty((3, 3)), np.empty((3, 3))))
     assert np.allclose(now.R_BtoW @ now.w_BinB, FLYING.R_BtoW @ FLYING.w_BinB)
     assert np.allclose(now.R_BtoW @ now.alpha_BinB, FLYING.R_BtoW @ FLYING.alpha_BinB)
 
@@ -175,8 +175,8 @@ def test_the_ball_that_returns_passes_the_gate() -> None:
     truth = open_about(hidden, np.radians(15.0))
     middle, axis = body_line(hidden)
     turn = Rotation.from_rotvec(np.radians(30.0) * axis).as_matrix()
-    guess = replace(perturbed(truth, np.zeros(12)), R_BtoW=truth.R_BtoW @ turn)
-    guess = replace(guess, p_BinW=truth.p_BinW + (truth.R_BtoW - guess.R_BtoW) @ middle)
+    guess = truth.with_parts(R_BtoW=truth.R_BtoW @ turn)
+    guess = guess.with_parts(p_BinW=truth.p_BinW + (truth.R_BtoW - guess.R_BtoW) @ middle)
     guess = replace(guess, P=open_about(hidden, np.radians(15.0)).P)
     ahead = predict(guess, 0, PROCESS).about_pivot()
     batch = make_batch(ahead, sightings(truth, RIG, [(0, 0), (1, 0)], 0.05), RIG)

@@ -9,7 +9,7 @@ import pytest
 
 from tests.tracker.rigs import TUNING
 from tracker.filter.witness import DOUBT_PX, OPEN_RAD, Quarrel, doubted_alone, too_lonely
-from tracker.state import ATTITUDE, State, start_covariance
+from tracker.state import ATTITUDE, State, mean_of, start_covariance
 from tracker.types import BallSighting, frozen_array
 
 SIGMA_PX = 0.05
@@ -17,7 +17,7 @@ SIGMA_PX = 0.05
 
 def state(attitude_rad: float) -> State:
     P = start_covariance(TUNING.process, np.zeros(1), 1e-3, attitude_rad)
-    return State(0, np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3), P)
+    return State(0, mean_of(np.zeros(3), np.eye(3)), P)
 
 
 def seen(*pairs: tuple[int, int], t_ns: int = 0) -> list[BallSighting]:

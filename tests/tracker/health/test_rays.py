@@ -46,7 +46,7 @@ def flight(count: int, cameras: int, seed: int) -> Iterator[State]:
     rng = np.random.default_rng(seed)
     for _ in range(count):
         place, angles, P = rng.uniform(-0.3, 0.3, 3), rng.uniform(-20, 20, 3), 1e-12 * np.eye(OFFSETS + cameras - 1)
-        yield replace(state(p_BinW=place, euler_deg=angles, P=P), offsets_s=np.zeros(cameras))
+        yield state(p_BinW=place, euler_deg=angles, P=P, cameras=cameras)
 
 
 def told(rig: Rig, *knocks: Knock, seed: int = 1, before: int = 10, faults: Array | None = None) -> Odds:
@@ -100,7 +100,7 @@ def test_a_clock_that_is_not_known_yet_is_no_bump() -> None:
     rig, P = ring_rig(3), np.diag(np.append(np.full(OFFSETS, 1e-6), [0.02, 0.02]) ** 2)
     agreement, odds = Agreement(3, left_open(0.05, rig)), Odds(at_odds=False)
     for still in flight(6, 3, 1):
-        moving = replace(still, v_BinW=np.array([0.6, -0.8, 0.3]), P=P)
+        moving = replace(still.with_parts(v_BinW=np.array([0.6, -0.8, 0.3])), P=P)
         seen = [one._replace(t_ns=0) for one in sightings(moving, rig, [(0, 0), (1, 15_000_000), (2, 0)], SIGMA_PX)]
         sample = take_sample(seen, moving, rig, SIGMA_PX)
         assert sample is not None

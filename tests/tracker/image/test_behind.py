@@ -13,7 +13,7 @@ from tracker.image.centre import Centre, fit_centre
 from tracker.image.patch import Expected, Response
 from tracker.image.template import FLAT
 from tracker.image.view import whereabouts
-from tracker.state import State, start_covariance
+from tracker.state import State, mean_of, start_covariance
 from tracker.types import Array, Frame, Image
 
 RIG = paper_rig()
@@ -131,7 +131,7 @@ def test_the_edge_of_the_picture_is_never_known() -> None:
 
 def test_the_vehicle_is_taken_to_reach_beyond_its_balls() -> None:
     P = start_covariance(TUNING.process, np.zeros(1), 1e-3, 1e-2)
-    state = State(0, np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3), P)
+    state = State(0, mean_of(np.zeros(3), np.eye(3)), P)
     u, v, clear_px = whereabouts(state, RIG, 0)
     balls_px = CAMERA.project(RIG.marker.points_inB)[0]
     farthest_px = np.hypot(balls_px[:, 0] - u, balls_px[:, 1] - v).max()

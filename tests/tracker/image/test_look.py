@@ -41,7 +41,7 @@ def test_every_ball_is_seen_where_it_is_though_the_track_is_a_little_off(camera:
 
 def test_the_region_is_at_the_frames_time_and_not_the_tracks() -> None:
     """100 ms at 1.5 m/s are 150 mm: the balls have left the regions of the state's own time."""
-    fast = replace(FLYING, v_BinW=np.array([0.0, -1.5, 0.0]), P=covariance(0.001, 0.01, 0.02, 0.05))
+    fast = replace(FLYING.with_parts(v_BinW=np.array([0.0, -1.5, 0.0])), P=covariance(0.001, 0.01, 0.02, 0.05))
     sightings, _ = look(frame(fast, RIG, 0, 100_000_000), fast)
     assert len(sightings) == 3
     assert {s.t_ns for s in sightings} == {100_000_000}

@@ -28,7 +28,7 @@ VECTOR = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1
 def known(now: State) -> State:
     """Return a state that is as sure of itself as a track is, errors correlated."""
     root = 1e-2 * np.random.default_rng(1).normal(size=(25, 25))
-    return replace(now, P=root @ root.T, offsets_s=np.zeros(2))
+    return replace(now, P=root @ root.T)
 
 
 @given(VECTOR, VECTOR, VECTOR, st.integers(0, 1), st.sampled_from([0, 16_700_000]))

@@ -9,7 +9,7 @@ import numpy as np
 from bridge.log.reader import LogReader
 from bridge.log.turns import turns
 from tracker.rig import Rig
-from tracker.state import OFFSETS, State
+from tracker.state import OFFSETS, State, mean_of
 from tracker.types import BallSighting, Estimate
 
 MOST = 1500  # instants: more tell little that is new
@@ -59,12 +59,5 @@ def _state(estimate: Estimate, rig: Rig) -> State:
     count = len(rig.cameras)
     offsets_s = estimate.clock_offsets_s if len(estimate.clock_offsets_s) else np.zeros(count)
     size = OFFSETS + count - 1
-    return State(
-        estimate.t_ns,
-        estimate.p_BinW,
-        estimate.R_BtoW,
-        estimate.v_BinW,
-        estimate.w_BinB,
-        np.zeros((size, size)),
-        offsets_s=np.array(offsets_s),
-    )
+    mean = mean_of(estimate.p_BinW, estimate.R_BtoW, estimate.v_BinW, estimate.w_BinB, offsets_s)
+    return State(estimate.t_ns, mean, np.zeros((size, size)))

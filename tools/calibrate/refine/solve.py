@@ -91,7 +91,7 @@ def refine(instants: Sequence[Instant], rig: Rig, unknowns: Unknowns, held: Held
 
 def with_offsets(instants: Sequence[Instant], offsets_s: Array) -> list[Instant]:
     """Return instants whose states have these clock offsets (cameras,) [s]."""
-    return [replace(one, state=replace(one.state, offsets_s=offsets_s.copy())) for one in instants]
+    return [replace(one, state=one.state.with_parts(offsets_s=offsets_s)) for one in instants]
 
 
 def _with_one_offset(instants: Sequence[Instant], cameras: int) -> tuple[list[Instant], Array]:

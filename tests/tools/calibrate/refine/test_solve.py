@@ -50,8 +50,8 @@ def flight(true: Rig, offsets_s: Array, kept: float, rng: np.random.Generator) -
             for ball, uv_px in enumerate(camera.project(balls_inW)[0] + bias_px[c] + noise_px[c]):
                 cov_px = frozen_array(0.01**2 * np.eye(2))
                 sightings.append(BallSighting(c, ball, k * PERIOD_NS, frozen_array(uv_px), cov_px))
-        guess = replace(state(k * PERIOD_NS), p_BinW=p_m, R_BtoW=R, v_BinW=v_m_s, w_BinB=np.zeros(3))
-        yield Instant(replace(guess, offsets_s=np.zeros(len(true.cameras))), tuple(sightings))
+        guess = state(k * PERIOD_NS, v_BinW=v_m_s, cameras=len(true.cameras)).with_parts(p_BinW=p_m, R_BtoW=R)
+        yield Instant(guess, tuple(sightings))
 
 
 def drawn(cameras: int, kept: float, seed: int) -> tuple[Refined, Array]:
