@@ -8,7 +8,7 @@ import numpy as np
 
 from tracker.filter.clocks import given_clocks
 from tracker.filter.correction import gathered_noise, innovation_covariance, path_noise
-from tracker.filter.manoeuvre import strengths
+from tracker.filter.manoeuvre import envelope
 from tracker.filter.matern import MOTIONS, unit_noise
 from tracker.filter.measure import Indices, camera_table, pixels
 from tracker.filter.predict import Prediction
@@ -19,10 +19,42 @@ from tracker.state import OFFSETS
 from tracker.types import Array, BallSighting
 
 
-class Batch(NamedTuple):
-    """Sightings as arrays, and what the prediction says of them.
+class Sighted(NamedTuple):
+    """Sightings as arrays.
 
-    z (2n,), R (2n, 2n): pixels and the noise of fit and camera.  cameras, balls, lags_s (n,) [s].
+    cameras, balls, lags_s: (n,) of each; the lag is its stamp after the prediction's time [s].
+    z: (2n,) pixels.  covs_px: (2n, 2) the fits' own covariances, one below the other [px^2].
+    """
+
+    sightings: tuple[BallSighting, ...]
+    cameras: Indices
+    balls: Indices
+    lags_s: Array
+    z: Array
+    covs_px: Array
+
+    def part(self, kept: list[int]) -> Sighted:
+        """Return the sightings of these indices."""
+        i, rows = np.array(kept), _rows_of(kept)
+        sightings = tuple(self.sightings[k] for k in kept)
+        return Sighted(
+            sightings, self.cameras[i], self.balls[i], self.lags_s[i], self.z[rows], self.covs_px[rows]
+        )  # fmt: skip
+
+
+def sighted(sightings: tuple[BallSighting, ...], t_ns: int) -> Sighted:
+    """Return sightings, at least one, as arrays for a prediction to t_ns."""
+    seen_by, seen, stamps_ns, uvs_px, covs_px2 = zip(*sightings, strict=True)
+    lags_s = np.array([(stamp_ns - t_ns) * 1e-9 for stamp_ns in stamps_ns])
+    return Sighted(
+        sightings, np.array(seen_by), np.array(seen), lags_s, np.concatenate(uvs_px), np.concatenate(covs_px2)
+    )  # fmt: skip
+
+
+class Batch(NamedTuple):
+    """Sightings, and what a prediction says of them.
+
+    R (2n, 2n): the noise of fit and camera.
     y (2n,): the prediction's innovation.  A (2n, 2n): its covariance without any manoeuvre.
     B (s, 2n, 2n): what each strength of 1 adds to it, (s,) as `process_noise` takes them.
     path (s, 2n, 2n): the part of B that lies between the state's time and the cameras'.
@@ -30,12 +62,8 @@ class Batch(NamedTuple):
     tops (s,): the envelope's strengths.
     """
 
-    sightings: tuple[BallSighting, ...]
-    z: Array
+    sighted: Sighted
     R: Array
-    cameras: Indices
-    balls: Indices
-    lags_s: Array
     y: Array
     A: Array
     B: Array
@@ -45,40 +73,39 @@ class Batch(NamedTuple):
 
     def part(self, kept: list[int]) -> Batch:
         """Return the batch with only the sightings of these indices."""
-        if len(kept) == len(self.sightings):
+        if len(kept) == len(self.sighted.sightings):
             return self
-        i = np.array(kept)
-        rows = np.stack((2 * i, 2 * i + 1), axis=1).reshape(-1)
+        rows = _rows_of(kept)
         square = (..., rows[:, None], rows)
         return Batch(
-            tuple(self.sightings[k] for k in kept), self.z[rows], self.R[square], self.cameras[i], self.balls[i],
-            self.lags_s[i], self.y[rows], self.A[square],
-            np.ascontiguousarray(self.B[square]), np.ascontiguousarray(self.path[square]), self.doubt[square],
-            self.tops,
+            self.sighted.part(kept), self.R[square], self.y[rows], self.A[square], np.ascontiguousarray(self.B[square]),
+            np.ascontiguousarray(self.path[square]), self.doubt[square], self.tops,
         )  # fmt: skip
 
     def distances2(self) -> list[float]:
         """Return each sighting's squared Mahalanobis distance (n,), as far as the envelope goes; inf where unseen."""
-        found: list[float] = _distances2(self.y, self.A, self.B, self.tops).tolist()
+        found: list[float] = distances2(self.y, self.A, self.B, self.tops).tolist()
         return found
 
 
-def make_batch(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig) -> Batch:
+def _rows_of(kept: list[int]) -> Indices:
+    """Return the rows of some sightings' pixels, two for each."""
+    i = np.array(kept)
+    return np.stack((2 * i, 2 * i + 1), axis=1).reshape(-1)
+
+
+def make_batch(ahead: Prediction, seen: Sighted, rig: Rig) -> Batch:
     """Compare sightings with a prediction. A ball predicted behind its camera has NaN for an innovation."""
     state, T = ahead.state, ahead.process.manoeuvre_s
-    seen_by, seen, stamps_ns, uvs_px, covs_px2 = zip(*sightings, strict=True)
-    cameras, balls = np.array(seen_by), np.array(seen)
-    lags_s = np.array([(t_ns - state.t_ns) * 1e-9 for t_ns in stamps_ns])
-    z, covs_px = np.concatenate(uvs_px), np.concatenate(covs_px2)
-    y, R, A, B, path, doubt = _compared(
-        state.mean, state.P, ahead.P_coasted, ahead.dt, T, z, covs_px, state.noise, cameras, balls, lags_s,
-        camera_table(rig), ahead.points_of(rig), ahead.turn_open,
+    y, R, A, B, path, doubt = compared(
+        state.mean, state.P, ahead.P_coasted, ahead.dt, T, seen.z, seen.covs_px, state.noise, seen.cameras, seen.balls,
+        seen.lags_s, camera_table(rig), ahead.points_of(rig), ahead.turn_open,
     )  # fmt: skip
-    return Batch(sightings, z, R, cameras, balls, lags_s, y, A, B, path, doubt, strengths(ahead.process)[:, -1])
+    return Batch(seen, R, y, A, B, path, doubt, envelope(ahead.process))
 
 
-@compiled("f8[::1](f8[::1], f8[:, ::1], f8[:, :, ::1], f8[:])")
-def _distances2(y: Array, A: Array, B: Array, tops: Array) -> Array:
+@compiled("f8[::1](f8[::1], f8[:, ::1], f8[:, :, ::1], f8[::1])")
+def distances2(y: Array, A: Array, B: Array, tops: Array) -> Array:
     """Return y' S^-1 y (n,) of each sighting's 2 x 2 block."""
     found = np.empty(len(y) // 2)
     for s in range(len(found)):
@@ -141,7 +168,7 @@ def _covariances(
 @compiled("Tuple((f8[::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1]))"
           "(f8[::1], f8[:, ::1], f8[:, ::1], f8, f8, f8[::1], f8[:, ::1], f8[:, ::1], i8[::1], i8[::1], f8[::1],"
           " f8[:, ::1], f8[:, ::1], b1)")  # fmt: skip
-def _compared(
+def compared(
     mean: Array, P: Array, P_coasted: Array, dt: float, T: float, z: Array, covs_px: Array, noise: Array,
     cameras: Indices, balls: Indices, lags_s: Array, table: Array, points_inB: Array, turn_open: bool,
 ) -> tuple[Array, Array, Array, Array, Array, Array]:  # fmt: skip

@@ -7,6 +7,7 @@ state goes in, a new state comes out.
     predict  coast to the new time (predict)
     update   gate each sighting (batch) -> how brisk is the manoeuvre (manoeuvre), which state is likeliest (fit)
              -> leave out liars -> one linear update with the converged slope and learn the noise (posterior)
+             where nothing is to be left out, gate and fit are one compiled call (at_once)
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ from typing import NamedTuple
 import numpy as np
 from filterpy.kalman import KalmanFilter
 
-from tracker.filter.batch import Batch, make_batch
+from tracker.filter.at_once import fit_at_once
+from tracker.filter.batch import Batch, Sighted, make_batch, sighted
 from tracker.filter.correction import inverse_of
 from tracker.filter.fit import Fit, fit
 from tracker.filter.posterior import settled
@@ -61,22 +63,28 @@ def update(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig, pro
     if not sightings:
         return Rejected(Reason.FRAME_GATE, "no sighting near the prediction", ahead.state.t_ns)
     ahead = ahead.about_pivot()
-    batch = make_batch(ahead, sightings, rig)
+    seen = sighted(sightings, ahead.state.t_ns)
+    plain = fit_at_once(ahead, seen, rig, probability)
+    return _chosen(ahead, seen, rig, probability) if plain is None else _updated(ahead, plain, ())
+
+
+def _chosen(ahead: Prediction, seen: Sighted, rig: Rig, probability: float) -> Update | Rejected:
+    """Update by those sightings that belong."""
+    batch, limit = make_batch(ahead, seen, rig), chi2_limit(probability, 2)
     distances2 = batch.distances2()
-    limit = chi2_limit(probability, 2)
     near = [i for i, distance2 in enumerate(distances2) if distance2 <= limit]
-    far = sorted({*range(len(sightings))}.difference(near)) if len(near) < len(sightings) else []
-    rejected = [_left_out(sightings[i], rig, distances2[i], "from the prediction") for i in far]
+    far = sorted({*range(len(distances2))}.difference(near))
+    rejected = [_left_out(seen.sightings[i], rig, distances2[i], "from the prediction") for i in far]
     if not near:
         return Rejected(Reason.FRAME_GATE, "no sighting near the prediction", ahead.state.t_ns)
-    seen, batch = batch.cameras, batch.part(near)
-    shut_out = far and set(batch.cameras.tolist()) != set(seen.tolist())
+    batch = batch.part(near)
+    shut_out = far and set(batch.sighted.cameras.tolist()) != set(seen.cameras.tolist())
     if shut_out and not _expected(ahead, batch, rig, probability):
         return Rejected(Reason.FRAME_GATE, "a camera is shut out, and the others see a manoeuvre", ahead.state.t_ns)
     whole = fit(ahead, batch, rig)
     if whole is None:
         return Rejected(Reason.FRAME_GATE, "the fit runs away", ahead.state.t_ns)
-    best = whole if _fits(whole, probability) else _without_liars(ahead, whole, rig, probability)
+    best = whole if _fits(whole, probability) else _without_liars(ahead, batch, whole, rig, probability)
     if best is None:
         detail = f"NIS {whole.nis:.0f} with {2 * len(near)} degrees of freedom"
         if ahead.dt == 0.0:  # no track that sightings could contradict
@@ -84,11 +92,15 @@ def update(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig, pro
                 f"the cameras do not agree on where the balls are, {detail}: has one moved since it was calibrated?"
             )
         return Rejected(Reason.FRAME_GATE, detail, ahead.state.t_ns)
-    for sighting, gain in zip(batch.sightings, whole.gains() if best is not whole else (), strict=False):
-        if not any(sighting is one for one in best.batch.sightings):
+    for sighting, gain in zip(batch.sighted.sightings, whole.gains() if best is not whole else (), strict=False):
+        if not any(sighting is one for one in best.sighted.sightings):
             rejected.append(_left_out(sighting, rig, float(gain), "from what the others say"))
+    return _updated(ahead, best, tuple(rejected))
+
+
+def _updated(ahead: Prediction, best: Fit, rejected: tuple[Rejected, ...]) -> Update:
     state = at_origin(_posterior(ahead, best), ahead.pivot_inB)
-    return Update(state, best.nis, len(best.u), best.batch.sightings, tuple(rejected))
+    return Update(state, best.nis, len(best.u), best.sighted.sightings, rejected)
 
 
 def _fits(one: Fit, probability: float) -> bool:
@@ -102,18 +114,17 @@ def _expected(ahead: Prediction, batch: Batch, rig: Rig, probability: float) -> 
     return one is not None and _fits(one, probability)
 
 
-def _without_liars(ahead: Prediction, whole: Fit, rig: Rig, probability: float) -> Fit | None:
+def _without_liars(ahead: Prediction, batch: Batch, whole: Fit, rig: Rig, probability: float) -> Fit | None:
     """Return the best fit without a few sightings, or without a camera that shows another time; None when none fits."""
-    few = _without_few(ahead, whole, rig, probability)
-    if few is None or _splits_a_camera(whole.batch, few.batch):
-        return _without_a_camera(ahead, whole.batch, rig, probability)
+    few = _without_few(ahead, batch, whole, rig, probability)
+    if few is None or _splits_a_camera(batch.sighted, few.sighted):
+        return _without_a_camera(ahead, batch, rig, probability)
     return few
 
 
-def _without_few(ahead: Prediction, whole: Fit, rig: Rig, probability: float) -> Fit | None:
+def _without_few(ahead: Prediction, batch: Batch, whole: Fit, rig: Rig, probability: float) -> Fit | None:
     """Return the best fit without up to a third of the sightings, None when none fits."""
-    batch = whole.batch
-    everyone = range(len(batch.sightings))
+    everyone = range(len(batch.sighted.sightings))
     suspects = np.argsort(-whole.gains())[:MAX_SUSPECTS].tolist()
     for count in range(1, len(everyone) // 3 + 1):
         tried = [
@@ -126,10 +137,10 @@ def _without_few(ahead: Prediction, whole: Fit, rig: Rig, probability: float) ->
     return None
 
 
-def _splits_a_camera(batch: Batch, kept: Batch) -> bool:
+def _splits_a_camera(seen: Sighted, kept: Sighted) -> bool:
     """Say whether most of a camera's sightings were left out, and some kept."""
-    seen, left = np.bincount(batch.cameras), np.bincount(kept.cameras, minlength=int(batch.cameras.max()) + 1)
-    return bool(((left > 0) & (2 * left < seen)).any())
+    all_of, left = np.bincount(seen.cameras), np.bincount(kept.cameras, minlength=int(seen.cameras.max()) + 1)
+    return bool(((left > 0) & (2 * left < all_of)).any())
 
 
 def _without_a_camera(ahead: Prediction, batch: Batch, rig: Rig, probability: float) -> Fit | None:
@@ -139,8 +150,8 @@ def _without_a_camera(ahead: Prediction, batch: Batch, rig: Rig, probability: fl
     choice fits, nobody can tell who lies.
     """
     fitting = []
-    for camera in sorted(set(batch.cameras.tolist())):
-        others = [i for i, sighting in enumerate(batch.sightings) if sighting.camera != camera]
+    for camera in sorted(set(batch.sighted.cameras.tolist())):
+        others = [i for i, sighting in enumerate(batch.sighted.sightings) if sighting.camera != camera]
         one = fit(ahead, batch.part(others), rig, adapt=False) if others else None
         if one is not None and _fits(one, probability):
             fitting.append(one)
@@ -159,7 +170,7 @@ def _posterior(ahead: Prediction, best: Fit) -> State:
     step.x, step.P, step.R = np.zeros((len(best.P), 1)), best.P, best.R
     step.update(best.y[:, None], H=best.H)
     mean, P, noise = settled(
-        prior.mean, best.P, ahead.dt, best.H, best.dx, step.P, prior.noise, best.batch.cameras, best.u, best.inverse
+        prior.mean, best.P, ahead.dt, best.H, best.dx, step.P, prior.noise, best.sighted.cameras, best.u, best.inverse
     )
     return State(prior.t_ns, mean, P, best.levels, noise, prior.manoeuvre_s)
 

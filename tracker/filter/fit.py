@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.filter import manoeuvre
-from tracker.filter.batch import Batch
+from tracker.filter.batch import Batch, Sighted
 from tracker.filter.bend import bend_noise
 from tracker.filter.correction import TILT_ROWS, likeliest, weighed
 from tracker.filter.manoeuvre import expected, judged, log_likelihoods
@@ -27,14 +27,14 @@ SHORTEST_S = 1e-3  # a tilt measured twice within less tells no more
 
 
 class Fit(NamedTuple):
-    """A fit of a batch: the error dx found, and what leads there from the prior by one linear update.
+    """A fit of some sightings: the error dx found, and what leads there from the prior by one linear update.
 
     P: prior covariance with the manoeuvre's noise in it.  levels: of the manoeuvre, after these sightings.
     y (2n + 2,), H, R: innovation, slope and covariance of the sightings, then of the tilt.
     u, inverse: S^-1 y and S^-1 of the sightings.  nis: y' S^-1 y.
     """
 
-    batch: Batch
+    sighted: Sighted
     dx: Array
     P: Array
     levels: Array
@@ -67,12 +67,10 @@ def fit(ahead: Prediction, batch: Batch, rig: Rig, *, adapt: bool = True) -> Fit
     Two balls do not show the turn about their line. Then roll and pitch, which stay within bounds over a flight, bound
     it, and where its curvature shows, that goes into the noise and the fit is made again (`_bend`).
     """
-    process, n = ahead.process, len(batch.z)
-    # A tilt that lasts, as white noise of the same spectral density.
-    tilt = 2.0 * process.tilt_rad**2 * process.tilt_s / max(ahead.dt, SHORTEST_S)
-    levels, P, R, doubtful = _prepared(
+    process, n = ahead.process, len(batch.y)
+    levels, P, R, doubtful = prepared(
         ahead.state.levels, manoeuvre.strengths(process), batch.y, batch.A, batch.B, batch.R, batch.path, batch.doubt,
-        ahead.P_coasted, ahead.dt, process.manoeuvre_s, tilt, adapt, ahead.turn_open,
+        ahead.P_coasted, ahead.dt, process.manoeuvre_s, tilt_variance(ahead), adapt, ahead.turn_open,
     )  # fmt: skip
     agreed = None if doubtful and _clock_open(batch) else _fitted(ahead, batch, rig, levels, P, R)
     if not doubtful:
@@ -83,9 +81,15 @@ def fit(ahead: Prediction, batch: Batch, rig: Rig, *, adapt: bool = True) -> Fit
     return _likelier(agreed, doubted)
 
 
+def tilt_variance(ahead: Prediction) -> float:
+    """Return the variance of roll and of pitch: a tilt that lasts, as white noise of the same spectral density."""
+    process = ahead.process
+    return 2.0 * process.tilt_rad**2 * process.tilt_s / max(ahead.dt, SHORTEST_S)
+
+
 @compiled("Tuple((f8[:, ::1], f8[:, ::1], f8[:, ::1], b1))(f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1],"
           " f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8, f8, f8, b1, b1)")  # fmt: skip
-def _prepared(
+def prepared(
     levels: Array, of: Array, y: Array, A: Array, B: Array, R_pixels: Array, path: Array, doubt: Array,
     P_coasted: Array, dt: float, T: float, tilt: float, adapt: bool, unseen: bool,
 ) -> tuple[Array, Array, Array, bool]:  # fmt: skip
@@ -120,8 +124,9 @@ def _clock_open(batch: Batch) -> bool:
     It shows no instant that clocks could agree on; taken at its word it makes a wrong speed and a wrong offset that
     bear each other out.
     """
-    alone = bool((batch.cameras == batch.cameras[0]).all())
-    return alone and float(np.trace(batch.doubt)) > len(batch.z) * CLOCK_OPEN_PX**2
+    cameras = batch.sighted.cameras
+    alone = bool((cameras == cameras[0]).all())
+    return alone and float(np.trace(batch.doubt)) > len(batch.y) * CLOCK_OPEN_PX**2
 
 
 def _likelier(agreed: Fit | None, doubted: Fit | None) -> Fit | None:
@@ -137,30 +142,30 @@ def _likelier(agreed: Fit | None, doubted: Fit | None) -> Fit | None:
 
 def _fitted(ahead: Prediction, batch: Batch, rig: Rig, levels: Array, P: Array, R: Array) -> Fit | None:
     """Fit with a given prior covariance P and noise R; None when the fit runs away."""
-    stands, turn_open, dx, y, H, u, inverse, nis = _solve(ahead, batch, rig, P, R)
+    stands, turn_open, dx, y, H, u, inverse, nis = _solve(ahead, batch.sighted, rig, P, R)
     if stands and turn_open:
-        bend = _bend(ahead, batch, rig, dx, P, H, R)
+        bend = _bend(ahead, batch.sighted, rig, dx, P, H, R)
         if bend is not None:
             n, R = len(bend), R.copy()
             R[:n, :n] += bend
-            stands, _, dx, y, H, u, inverse, nis = _solve(ahead, batch, rig, P, R)
-    return Fit(batch, dx, P, levels, y, H, R, u, inverse, nis) if stands else None
+            stands, _, dx, y, H, u, inverse, nis = _solve(ahead, batch.sighted, rig, P, R)
+    return Fit(batch.sighted, dx, P, levels, y, H, R, u, inverse, nis) if stands else None
 
 
 Solution = tuple[bool, bool, Array, Array, Array, Array, Array, float]
 """Whether there is one; whether it leaves a turn open; dx, y, H, u, inverse and nis of a `Fit`."""
 
 
-def _solve(ahead: Prediction, batch: Batch, rig: Rig, P: Array, R: Array) -> Solution:
-    return _solved(
-        ahead.state.mean, P, ahead.process.manoeuvre_s, batch.z, R, batch.cameras, batch.balls, batch.lags_s,
+def _solve(ahead: Prediction, seen: Sighted, rig: Rig, P: Array, R: Array) -> Solution:
+    return solved(
+        ahead.state.mean, P, ahead.process.manoeuvre_s, seen.z, R, seen.cameras, seen.balls, seen.lags_s,
         camera_table(rig), ahead.points_of(rig),
     )  # fmt: skip
 
 
 @compiled("Tuple((b1, b1, f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], f8))(f8[::1], f8[:, ::1], f8, f8[::1],"
           " f8[:, ::1], i8[::1], i8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")  # fmt: skip
-def _solved(
+def solved(
     mean: Array, P: Array, T: float, z: Array, R: Array, cameras: Indices, balls: Indices, lags_s: Array,
     table: Array, points_inB: Array,
 ) -> Solution:  # fmt: skip
@@ -171,7 +176,7 @@ def _solved(
     return np.isfinite(dx).all(), turn_open, dx, y, H, u, inverse, nis
 
 
-def _bend(ahead: Prediction, batch: Batch, rig: Rig, dx: Array, P: Array, H: Array, R: Array) -> Array | None:
+def _bend(ahead: Prediction, seen: Sighted, rig: Rig, dx: Array, P: Array, H: Array, R: Array) -> Array | None:
     """Return the covariance (2n, 2n) [px^2] of what a pose left open does beyond first order, None if little.
 
     Arms are from the pivot, so a turn about two balls bends nothing; what one camera alone leaves open does.
@@ -179,7 +184,7 @@ def _bend(ahead: Prediction, batch: Batch, rig: Rig, dx: Array, P: Array, H: Arr
     HP = H @ P
     after = P - HP.T @ np.linalg.solve(HP @ H.T + R, HP)
     noise = bend_noise(
-        ahead.state.mean, dx, after, ahead.process.manoeuvre_s, batch.cameras, batch.balls, batch.lags_s,
+        ahead.state.mean, dx, after, ahead.process.manoeuvre_s, seen.cameras, seen.balls, seen.lags_s,
         camera_table(rig), ahead.points_of(rig),
     )  # fmt: skip
     little = np.diag(noise) < BEND_SHARE**2 * np.diag(R)[: len(noise)]

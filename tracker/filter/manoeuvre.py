@@ -54,6 +54,12 @@ def strengths(process: Process) -> Array:
     return np.concatenate((sigmas**2, sigmas**2 * shares / SUDDEN_S))
 
 
+@lru_cache(maxsize=16)
+def envelope(process: Process) -> Array:
+    """Return the strengths (KINDS * MOTIONS,) of the briskest level."""
+    return strengths(process)[:, -1].copy()
+
+
 @compiled("f8[:, ::1](f8[:, ::1], f8)")
 def later(levels: Array, dt: float) -> Array:
     """Return the probabilities (MOTIONS, LEVELS) after dt without a sighting."""

@@ -22,9 +22,9 @@ from tests.tracker.rigs import (
     state,
 )
 from tracker.filter import ekf
-from tracker.filter.batch import make_batch
+from tracker.filter.batch import make_batch, sighted
 from tracker.filter.ekf import Update
-from tracker.filter.manoeuvre import strengths
+from tracker.filter.manoeuvre import envelope
 from tracker.filter.matern import process_noise
 from tracker.filter.measure import predicted_pixels
 from tracker.filter.predict import Prediction, first_guess, predict
@@ -38,7 +38,7 @@ PERIOD_NS = 33_333_333
 OPEN = 1.0 - 1e-9  # a gate that lets every true sighting pass
 GATE = 0.999
 AT_FIRST_SIGHT = covariance(0.05, 0.3, 2.5, 1.6)
-BRISKEST = process_noise(25, PERIOD_NS * 1e-9, PROCESS.manoeuvre_s, strengths(PROCESS)[:, -1].copy())
+BRISKEST = process_noise(25, PERIOD_NS * 1e-9, PROCESS.manoeuvre_s, envelope(PROCESS))
 NOISE = BRISKEST + 1e-18 * np.eye(25)
 FLYING = state(0, (0.2, -0.1, 0.1), (12.0, -8.0, 130.0), (1.0, -0.5, 0.3), (0.4, -0.8, 1.5))
 
@@ -121,7 +121,8 @@ def test_one_camera_does_not_carry_a_track_out_of_the_envelope_alone() -> None:
     jump_inW = sigma_m * (3.0 * across_inW + 4.3 * along_inW)
     jumped = ahead.state.with_parts(p_BinW=ahead.state.p_BinW + jump_inW)
     seen = sightings(jumped, RIG, [(0, PERIOD_NS), (1, PERIOD_NS)], SIGMA_PX)
-    near = [distance2 < chi2.ppf(GATE, 2) for distance2 in make_batch(ahead, seen, RIG).distances2()]
+    distances2 = make_batch(ahead, sighted(seen, PERIOD_NS), RIG).distances2()
+    near = [distance2 < chi2.ppf(GATE, 2) for distance2 in distances2]
     assert near == [sighting.camera == 0 for sighting in seen]
     assert isinstance(update(ahead, seen, RIG, GATE), Rejected)
 

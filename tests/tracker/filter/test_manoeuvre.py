@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.stats import multivariate_normal
 
 from tests.tracker.rigs import PROCESS, ring_rig, sightings, state
-from tracker.filter.batch import make_batch
+from tracker.filter.batch import make_batch, sighted
 from tracker.filter.manoeuvre import LEVELS, RARER, expected, later, log_likelihoods, start_levels, strengths
 from tracker.filter.matern import MOTIONS, process_noise
 from tracker.filter.measure import predicted_pixels
@@ -48,7 +48,7 @@ def test_each_strength_adds_its_process_noise_to_the_innovation(strength: int) -
     now = state(0, (0.2, -0.1, 0.1), (12.0, -8.0, 130.0), (1.0, -0.5, 0.3), (0.4, -0.8, 1.5))
     ahead = predict(now, t_ns, PROCESS)
     seen = sightings(now, rig, [(0, t_ns), (1, t_ns + 5_000_000)], 0.1)
-    batch = make_batch(ahead, seen, rig)
+    batch = make_batch(ahead, sighted(seen, t_ns), rig)
     H = np.concatenate([predicted_pixels(ahead.state, rig, s.camera, s.t_ns)[1][s.ball] for s in seen])
     Q = process_noise(25, ahead.dt, PROCESS.manoeuvre_s, np.eye(4)[strength])
     assert np.allclose(batch.B[strength] - batch.path[strength], H @ Q @ H.T)

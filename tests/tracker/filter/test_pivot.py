@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tests.tracker.rigs import PROCESS, covariance, difference, ring_rig, sightings, state
-from tracker.filter.batch import make_batch
+from tracker.filter.batch import make_batch, sighted
 from tracker.filter.correction import moved, moved_slope
 from tracker.filter.pivot import best_known, moved_to
 from tracker.filter.predict import Prediction, predict
@@ -106,7 +106,8 @@ def test_pixels_say_nothing_of_the_open_turn_wherever_the_estimate_stands(hidden
     turned = ahead.state.moved(open_turn * np.radians(40.0))
     seen = tuple(s for s in sightings(FLYING, RIG, [(0, 0), (1, 0)], 0.1) if s.ball != hidden)
     before, after = (
-        make_batch(Prediction(at, at.P, 0.0, PROCESS, ahead.pivot_inB), seen, RIG).y for at in (ahead.state, turned)
+        make_batch(Prediction(at, at.P, 0.0, PROCESS, ahead.pivot_inB), sighted(seen, 0), RIG).y
+        for at in (ahead.state, turned)
     )
     assert np.abs(after - before).max() < 0.01
 
@@ -179,5 +180,5 @@ def test_the_ball_that_returns_passes_the_gate() -> None:
     guess = guess.with_parts(p_BinW=truth.p_BinW + (truth.R_BtoW - guess.R_BtoW) @ middle)
     guess = replace(guess, P=open_about(hidden, np.radians(15.0)).P)
     ahead = predict(guess, 0, PROCESS).about_pivot()
-    batch = make_batch(ahead, sightings(truth, RIG, [(0, 0), (1, 0)], 0.05), RIG)
+    batch = make_batch(ahead, sighted(sightings(truth, RIG, [(0, 0), (1, 0)], 0.05), 0), RIG)
     assert max(batch.distances2()) < 13.8
