@@ -68,20 +68,19 @@ class Study:
             again, sharper = self._glance(frames, ahead, found.state, harvest, last)
             found, look = (again, sharper) if isinstance(again, Update) else (found, look)
         harvest.rejections += look.rejections
-        seen = [one.sighting for one in look.fitted]
+        taught = look.sightings
         if isinstance(found, Rejected):
             harvest.rejections.append(found)
-            harvest.refused += seen
+            harvest.refused += look.sightings
             return None
         harvest.sightings += found.used
         harvest.rejections += found.rejected
         blindly = self._eyes.blind(found.state)
-        fitted = look.fitted
-        if len(found.used) < len(fitted):
+        if len(found.used) < len(taught):
             used = {(sighting.camera, sighting.ball) for sighting in found.used}
-            fitted = [one for one in fitted if (one.sighting.camera, one.sighting.ball) in used]
-            harvest.refused += [one for one in seen if (one.camera, one.ball) not in used]
-        self._eyes.learn(fitted, blindly=blindly)
+            taught = [one for one in look.sightings if (one.camera, one.ball) in used]
+            harvest.refused += [one for one in look.sightings if (one.camera, one.ball) not in used]
+        self._eyes.learn(look, taught, blindly=blindly)
         self._eyes.look_behind(frames, found.state)
         return found
 
@@ -92,7 +91,7 @@ class Study:
         started_ns = self._stopwatch()
         look = self._eyes.look(frames, expected)
         looked_ns = self._stopwatch()
-        sightings = doubted_alone([one.sighting for one in look.fitted], last)
+        sightings = doubted_alone(look.sightings, last)
         found = self.update(ahead, sightings)
         harvest.find_ns += looked_ns - started_ns
         harvest.filter_ns += self._stopwatch() - looked_ns

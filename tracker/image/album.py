@@ -111,7 +111,7 @@ class Album:
             if len(self._drawn) >= KEPT:
                 self._drawn.pop(next(iter(self._drawn)))
             self._drawn[wanted] = template
-            self._served.clear()  # it may be what another ball waits for
+            self._served = {each: served for each, served in self._served.items() if served[2]}  # others may want it
         self._serving[slot] = wanted, template
         return template
 

@@ -11,14 +11,14 @@ import numpy as np
 from tracker.image.album import Album
 from tracker.image.appearance import MISFIT_MAX, Appearance
 from tracker.image.behind import Behind
-from tracker.image.look import Fitted, Look, gaze_of, look_near
+from tracker.image.look import Look, gaze_of, look_near
 from tracker.image.rivals import first_rivals
 from tracker.image.sight import MISFIT
-from tracker.image.tint import Bgr, Gains, Tint, core_colour
+from tracker.image.tint import Gains, Tint, core_colour
 from tracker.image.view import RADIUS, unknown_streak_px, whereabouts
 from tracker.rig import Rig
 from tracker.state import State
-from tracker.types import Frame
+from tracker.types import BallSighting, Frame
 
 LIGHT_BALLS = 2  # a single ball that is something else would tell of a light that is not there
 LEARN_ALL = 108  # balls of each camera under its gamma; then
@@ -115,25 +115,26 @@ class Eyes:
         """Return one sigma of how far the balls' images may be smeared that the state does not know of [px]."""
         return unknown_streak_px(state, self._rig, self._exposures_s)
 
-    def learn(self, fitted: Sequence[Fitted], *, blindly: bool) -> None:
+    def learn(self, look: Look, seen: Sequence[BallSighting], *, blindly: bool) -> None:
         """Learn how balls look: from every one at first, then from one in turn every few rounds.
 
+        seen: sightings of the look that fitted.
         blindly: how fast they moved was not known. It is better than nothing, and forgotten if they did move.
         """
         self._turn += 1
-        self._follow_the_light(fitted)
+        self._follow_the_light(look, seen)
         if self._taught_blindly and not blindly:
             self._taught_blindly = False
-            if any(one.streak_px > LONG_STREAK_PX for one in fitted):
+            if any(look.fitted(one).streak_px > LONG_STREAK_PX for one in seen):
                 self._rivals = [first_rivals() for _ in self._rig.cameras]
                 self._sum_up()
         self._taught_blindly |= blindly and not self._gamma_known
         if self._settled:
             if self._turn % self._every:
                 return
-            fitted = [fitted[self._turn // self._every % len(fitted)]]
-        for one in fitted:
-            index = one.frame.camera
+            seen = [seen[self._turn // self._every % len(seen)]]
+        for sighting in seen:
+            one, index = look.fitted(sighting), sighting.camera
             camera, image = self._rig.cameras[index], one.frame.image
             expected = one.expected(camera, self._behind[index].room)
             self._rivals[index] = self._rivals[index].learned(image, camera, expected, one.centre)
@@ -149,18 +150,18 @@ class Eyes:
             if math.isfinite(u) and math.isfinite(v):
                 behind.learn(frame, (u, v), clear_px)
 
-    def _follow_the_light(self, fitted: Sequence[Fitted]) -> None:
+    def _follow_the_light(self, look: Look, seen: Sequence[BallSighting]) -> None:
         """Learn the light from the balls' colours: of each camera at first, then of those that see now in turn."""
-        cameras = sorted({one.frame.camera for one in fitted})
+        cameras = sorted({one.camera for one in seen})
         if cameras and all(self._tints[camera].settled for camera in cameras):
             cameras = [cameras[self._turn % len(cameras)]]
         for camera in cameras:
-            seen = [one for one in fitted if one.frame.camera == camera and float(one.fit[MISFIT]) <= MISFIT_MAX]
-            if len(seen) >= LIGHT_BALLS:
-                colours = [(one.sighting.ball, _colour(one)) for one in seen]
+            frame, views, fits, *_ = look.glances[camera]
+            fitted = [(one.ball, fits[one.ball].tolist()) for one in seen if one.camera == camera]
+            colours = [
+                (ball, core_colour(frame.image, fit[0], fit[1], views[ball][RADIUS]))
+                for ball, fit in fitted
+                if fit[MISFIT] <= MISFIT_MAX
+            ]
+            if len(colours) >= LIGHT_BALLS:
                 self._light_up(camera, self._tints[camera].learned(colours))
-
-
-def _colour(one: Fitted) -> Bgr:
-    u, v = one.sighting.uv_px.tolist()
-    return core_colour(one.frame.image, u, v, one.view[RADIUS])

@@ -28,7 +28,7 @@ from tracker.types import Array, BallSighting, Frame, Reason, Rejected, frozen_a
 NEAREST_M = 0.3  # a ball closer to a camera than this is not looked for
 
 
-class Fitted(NamedTuple):  # as `BallSighting`
+class Fitted(NamedTuple):
     """A sighting, and what `Appearance` learns from.
 
     view: a row of `view.expected_views`.  fit (sight.SIZE,): what was found.
@@ -60,23 +60,45 @@ class Fitted(NamedTuple):  # as `BallSighting`
         return Centre(self.fit[UV], self.fit[COV].reshape(2, 2), float(self.fit[MISFIT]))
 
 
+class Glance(NamedTuple):
+    """How one image was looked at, by ball.
+
+    views: rows of `view.expected_views`.  fits (balls, sight.SIZE): of those that were found.
+    appearance, drawn: what they were taken to look like; no templates where a ball was not looked for.
+    """
+
+    frame: Frame
+    views: Sequence[Sequence[float]]
+    fits: Array
+    appearance: Appearance
+    drawn: Sequence[tuple[Template, Template] | None]
+
+
 @dataclass(slots=True, eq=False)
 class Look:
     """What the images of one instant gave, and what was left out.
 
-    blind: it was not known how far the balls' images are smeared.
+    glances: by camera.  blind: it was not known how far the balls' images are smeared.
     """
 
-    fitted: list[Fitted] = field(default_factory=list)
+    sightings: list[BallSighting] = field(default_factory=list)
+    glances: dict[int, Glance] = field(default_factory=dict)
     rejections: list[Rejected] = field(default_factory=list)
     blind: bool = False
+
+    def fitted(self, sighting: BallSighting) -> Fitted:
+        """Return what a sighting was found by."""
+        ball, glance = sighting.ball, self.glances[sighting.camera]
+        drawn = glance.drawn[ball]
+        if drawn is None:
+            raise ValueError(f"ball {ball} was not looked for by camera {sighting.camera}")
+        return Fitted(sighting, glance.frame, glance.views[ball], glance.fits[ball], glance.appearance, drawn)
 
     def doubted(self, sigma_px: float) -> Look:
         """Return it with sightings that are less sure, by one sigma on each axis [px]."""
         more = sigma_px**2 * np.eye(2)
-        doubted = (one.sighting._replace(cov_px=frozen_array(one.sighting.cov_px + more)) for one in self.fitted)
-        fitted = [one._replace(sighting=sighting) for one, sighting in zip(self.fitted, doubted, strict=True)]
-        return Look(fitted, self.rejections, self.blind)
+        doubted = [one._replace(cov_px=frozen_array(one.cov_px + more)) for one in self.sightings]
+        return Look(doubted, self.glances, self.rejections, self.blind)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,23 +145,26 @@ def look_near(frames: Sequence[Frame], rig: Rig, state: State, gazes: Sequence[G
 def _find_balls(frame: Frame, rig: Rig, state: State, gaze: Gaze, look: Look) -> None:
     """Add each ball of the marker as seen in one image near its prediction, or why it is not."""
     image, camera, t_ns, appearance = frame.image, frame.camera, frame.t_ns, gaze.appearance
-    known, colours, serve, eye = gaze.known, gaze.colours, gaze.album.serve, rig.cameras[camera]
+    room, known, colours, serve, eye = gaze.room, gaze.known, gaze.colours, gaze.album.serve, rig.cameras[camera]
     rows = expected_views(state, rig, camera, t_ns)
-    read_ahead(image, gaze.room.mean, rows)
-    fits = np.empty((len(rows), SIZE))
+    read_ahead(image, room.mean, rows)
+    views, fits = rows.tolist(), np.empty((len(rows), SIZE))
+    drawn: list[tuple[Template, Template] | None] = []
     fixed = fits.view()
     fixed.flags.writeable = False
+    look.glances[camera] = Glance(frame, views, fixed, appearance, drawn)
     uvs_px, covs_px2 = fixed[:, UV], fixed[:, COV].reshape(-1, 2, 2)
-    for b, view in enumerate(rows.tolist()):
+    for b, view in enumerate(views):
         if not (math.isfinite(view[U] + view[V]) and view[DEPTH] >= NEAREST_M):
+            drawn.append(None)
             look.rejections.append(Rejected(Reason.BEHIND, f"{_name(rig, b)} is not before the camera", t_ns, camera))
             continue
-        drawn = serve(b, view, appearance)
-        failed = find_ball(image, gaze.room, colours[b], rows[b], known, drawn, fits[b])
+        templates = serve(b, view, appearance)
+        drawn.append(templates)
+        failed = find_ball(image, room, colours[b], rows[b], known, templates, fits[b])
         if failed is None:
             row_ns = t_ns + round(eye.delay_ns(fits[b, UV][1])) if eye.readout_ns else t_ns
-            sighting = BallSighting(camera, b, row_ns, uvs_px[b], covs_px2[b])
-            look.fitted.append(Fitted(sighting, frame, view, fixed[b], appearance, drawn))
+            look.sightings.append(BallSighting(camera, b, row_ns, uvs_px[b], covs_px2[b]))
         else:
             detail = f"no {_name(rig, b)} at ({view[U]:.0f}, {view[V]:.0f}) px, where it is expected"
             look.rejections.append(Rejected(failed, detail, t_ns, camera))

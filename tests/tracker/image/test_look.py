@@ -25,7 +25,7 @@ SHARP = Appearance(Response(0.25, 0.25, detail=1.0))
 def look(image: Frame, expected: State) -> tuple[list[BallSighting], list[Rejected]]:
     gazes = [gaze_of(RIG, SHARP, Album(camera)) for camera in RIG.cameras]
     found = look_near([image], RIG, expected, gazes)
-    return [fitted.sighting for fitted in found.fitted], list(found.rejections)
+    return found.sightings, found.rejections
 
 
 @pytest.mark.parametrize("camera", [0, 1])
