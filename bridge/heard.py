@@ -74,10 +74,9 @@ class Hearer:
     def _changed(self, far_ends: dict[str, DialogueState], now_ns: int, last: bool) -> list[tuple[str, DialogueState]]:
         changed = []
         for link, state in far_ends.items():
-            bare = replace(state, sync=None)
+            bare = state if state.sync is None else replace(state, sync=None)
             at_ns, told = self._far_ends.get(link, (0, None))
-            only_counts = told is not None and _without_counts(bare) == _without_counts(told)
-            if last or (bare != told and (not only_counts or now_ns - at_ns >= COUNTS_NS)):
+            if last or (bare != told and (now_ns - at_ns >= COUNTS_NS or not _only_counts(bare, told))):
                 self._far_ends[link] = now_ns, bare
                 changed.append((link, bare))
         return changed
@@ -91,6 +90,11 @@ class Hearer:
                 self._links[state.name] = now_ns, state
                 news.append(state)
         return tuple(news)
+
+
+def _only_counts(state: DialogueState, told: DialogueState | None) -> bool:
+    """Say whether nothing has changed but what only counts."""
+    return told is not None and _without_counts(state) == _without_counts(told)
 
 
 def _without_counts(state: DialogueState) -> DialogueState:

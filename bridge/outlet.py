@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from itertools import chain
 
 from bridge.clock import Nanoseconds
 from bridge.dialect import Encoder, Identity
@@ -98,10 +97,10 @@ class Outlet:
             for message in spout.dialogue.due(step.state, now_ns, spout.link.replaced(), self._calibration):
                 spout.link.send(message)
         for estimate in step.estimates:
-            talks = [(spout.link, spout.dialogue) for spout in self._spouts]
-            going = [(link, talk.messages) for link, talk in talks if talk.admits(estimate, now_ns)]
-            packed = self._packer.messages(estimate, dict.fromkeys(chain.from_iterable(names for _, names in going)))
-            for link, names in going:
+            going = [spout for spout in self._spouts if spout.dialogue.admits(estimate, now_ns)]
+            said = [(spout.link, spout.dialogue.messages) for spout in going]
+            packed = self._packer.messages(estimate, {name for _, names in said for name in names})
+            for link, names in said:
                 for name in names:
                     link.send(packed[name])
             self._watch(estimate, now_ns)

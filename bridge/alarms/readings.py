@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from bridge.telemetry.states import Surroundings
 from tracker.types import TrackState
@@ -22,8 +23,7 @@ class Limits:
     max_age_ms: float = 100.0
 
 
-@dataclass(frozen=True, slots=True)
-class CameraReading:
+class CameraReading(NamedTuple):
     """One camera.
 
     silent_ms: since its last frame [ms].  blind_s: since a ball of its images was last used, while tracking [s].
@@ -45,8 +45,7 @@ class CameraReading:
     at_vehicle_mm: float = 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class BallReading:
+class BallReading(NamedTuple):
     """One ball. unseen_s: since any camera's sighting of it was last used, while tracking [s]."""
 
     name: str

@@ -80,7 +80,7 @@ def _after(watch: Watch, finding: Finding, rule: Rule, t_ns: int) -> Watch:
     """Return a watch after one more finding; `_CALM` when there is nothing to remember."""
     raised = watch.raised_ns is not None
     if finding.verdict is not (Verdict.GOOD if raised else Verdict.BAD):
-        return replace(watch, turning_ns=None, cause=finding.cause, remedy=finding.remedy) if raised else _CALM
+        return Watch(watch.raised_ns, None, finding.cause, finding.remedy) if raised else _CALM
     turning_ns = t_ns if watch.turning_ns is None else watch.turning_ns
     if t_ns - turning_ns < (rule.clear_s if raised else rule.raise_s) * 1e9:
         return replace(watch, turning_ns=turning_ns)

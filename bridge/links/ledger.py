@@ -38,9 +38,8 @@ class Ledger:
 
     def took(self, message: Message, raw: bytes) -> None:
         """Enter a frame that the kernel took whole."""
-        record = Sent(
-            self.name, message.name, message.t_ns, self._stopwatch(), message.available_ns, raw, message.fields
-        )
+        name, t_ns, available_ns, fields, _ = message
+        record = Sent(self.name, name, t_ns, self._stopwatch(), available_ns, raw, fields)
         self._sequence = (self._sequence + 1) % 256
         with self._lock:
             self._records.append(record)
