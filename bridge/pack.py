@@ -6,12 +6,10 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 
-import numpy as np
-
 from bridge.dialect import enum
 from bridge.ned import NedFrame, NedState
 from bridge.wire import FieldValue, Message
-from tracker.types import Array, Estimate
+from tracker.types import Estimate
 
 Fields = dict[str, FieldValue]
 HEARTBEAT = "HEARTBEAT"
@@ -103,7 +101,8 @@ def _odometry(estimate: Estimate, ned: NedState) -> Fields:
 
 def _quality(estimate: Estimate) -> int:
     """Return MAVLink's quality 1..100 by the largest sigma of the position."""
-    sigma_m = math.sqrt(max(estimate.covariance.diagonal()[:3].tolist()))
+    variance = estimate.covariance.item
+    sigma_m = math.sqrt(max(variance(0, 0), variance(1, 1), variance(2, 2)))
     return max(1, round(100.0 * (1.0 - sigma_m / WORTHLESS_M)))
 
 
@@ -134,10 +133,10 @@ class Packer:
         t_ns, available_ns, ned = estimate.t_ns, estimate.available_ns, self._ned(estimate)
         return {name: Message(name, t_ns, available_ns, _FILL[name](estimate, ned)) for name in names}
 
-    def motion(self, estimate: Estimate) -> tuple[Array, float]:
-        """Return the velocity (3,), north-east-down [m/s], and the yaw [rad]."""
+    def motion(self, estimate: Estimate) -> tuple[list[float], float]:
+        """Return the velocity, north-east-down [m/s], and the yaw [rad]."""
         ned = self._ned(estimate)
-        return np.array(ned.v_BinN), ned.euler[2]
+        return ned.v_BinN, ned.euler[2]
 
     def _ned(self, estimate: Estimate) -> NedState:
         """Turn an estimate into NED; the newest one's turn is kept."""

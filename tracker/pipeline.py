@@ -45,7 +45,7 @@ from tracker.types import (
     Silence,
     Step,
     TrackState,
-    frozen_array,
+    read_only,
 )
 
 POSED = 3  # sightings that make a pose; fewer fit a mistake as well
@@ -266,7 +266,7 @@ class Tracker:
     def _estimate(self, found: Update, available_ns: int, stages: dict[str, int]) -> Estimate:
         state = found.state
         covariance, sigmas_s = reported(state, self._rig, self._eyes.exposure_s, self._eyes.doubts_px, self._moved_px)
-        mean = frozen_array(state.mean)
+        mean = read_only(state.mean)
         return Estimate(
             t_ns=state.t_ns,
             p_BinW=mean[:3],

@@ -41,6 +41,7 @@ class Process:
     pixel_noise_px: float
 
 
+R_ZZ = 11  # of `State.mean`: the attitude's last element, how upright the body is
 STILL = frozen_array(np.zeros(3))
 FIRST_CLOCK = frozen_array(np.zeros(1))  # the offset of a single camera's
 _PARTS = MappingProxyType(

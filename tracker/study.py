@@ -12,7 +12,7 @@ from tracker.harvest import Harvest
 from tracker.image.eyes import Eyes
 from tracker.image.look import Look
 from tracker.rig import Rig
-from tracker.state import State
+from tracker.state import R_ZZ, State
 from tracker.tuning import Tuning
 from tracker.types import BallSighting, Frame, Reason, Rejected
 
@@ -114,4 +114,4 @@ class Study:
 
 def _tilt_rad(state: State) -> float:
     """Return the angle between the body's z and the room's [rad]."""
-    return math.acos(max(-1.0, min(1.0, float(state.R_BtoW[2, 2]))))
+    return math.acos(max(-1.0, min(1.0, state.mean.item(R_ZZ))))

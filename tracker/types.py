@@ -29,6 +29,13 @@ def frozen_array(values: ArrayLike) -> Array:
     return array
 
 
+def read_only(array: Array) -> Array:
+    """Return a view of an array, of which it is known that nobody writes to it any more, for reading alone."""
+    view = array.view()
+    view.flags.writeable = False
+    return view
+
+
 class Reason(StrEnum):
     """Why something was left out. Each value is a key of the summary's `rejected` counts."""
 

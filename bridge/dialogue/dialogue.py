@@ -18,7 +18,7 @@ from bridge.dialogue.streams import NOTHING, StreamKeeper, Wanted
 from bridge.dialogue.timesync import CONVERGED_SAMPLES, TIMESYNC, SyncState, TimeSync
 from bridge.pack import heartbeat
 from bridge.wire import Message, Received
-from tracker.types import Array, Estimate, TrackState
+from tracker.types import Estimate, TrackState
 
 HEARTBEAT_PERIOD_NS = 1_000_000_000
 STALE_NS = 3_000_000_000  # without a word of the autopilot for this long, it is away
@@ -203,8 +203,8 @@ class Dialogue:
         self._last_pose_ns = estimate.t_ns
         return True
 
-    def watch(self, t_ns: int, v_N: Array, yaw: float, now_ns: int) -> None:
-        """Take our velocity (3,) [m/s] and yaw [rad] in north-east-down, to be held against the autopilot's tilt."""
+    def watch(self, t_ns: int, v_N: Sequence[float], yaw: float, now_ns: int) -> None:
+        """Take our velocity [m/s] and yaw [rad] in north-east-down, to be held against the autopilot's tilt."""
         self._heading.take_pose(t_ns, v_N, yaw, self._watch.armed, now_ns)
 
     def state(self, now_ns: int) -> DialogueState:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from bridge.dialect import enum, make_message, message_id
 from bridge.dialogue.peer import Peer
@@ -40,8 +41,8 @@ class HeadingWatch:
         self._watch.take_tilt(roll, pitch)
         self._tilt_ns = attitude.arrived_ns
 
-    def take_pose(self, t_ns: int, v_N: Array, yaw: float, armed: bool, now_ns: int) -> None:
-        """Take our velocity (3,), north first [m/s], and yaw [rad] at t_ns; a vehicle in the hand proves nothing.
+    def take_pose(self, t_ns: int, v_N: Sequence[float] | Array, yaw: float, armed: bool, now_ns: int) -> None:
+        """Take our velocity, north first [m/s], and yaw [rad] at t_ns; a vehicle in the hand proves nothing.
 
         armed: whether it may be flying.  now_ns: stream time [ns].
         """

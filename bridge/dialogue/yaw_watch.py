@@ -7,6 +7,7 @@ variance stays 0 while no velocity is fused. Here it is seen within seconds of m
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,7 +82,7 @@ class YawWatch:
         """
         self._tilt = (roll, pitch)
 
-    def take_pose(self, t_ns: int, v_N: Array, yaw: float) -> None:
+    def take_pose(self, t_ns: int, v_N: Sequence[float] | Array, yaw: float) -> None:
         """Take the bridge's velocity (2,) or (3,), north first [m/s], and yaw [rad] at t_ns [ns]."""
         if self._tilt is None or abs(self._tilt[1]) > 1.0 or abs(self._tilt[0]) > 1.0:
             self._start = None

@@ -39,7 +39,7 @@ def doubted_alone(sightings: Sequence[BallSighting], last: State | None) -> tupl
 
     last: what the sightings before left known; None while nothing is tracked.
     """
-    if last is None or max(last.P.diagonal()[ATTITUDE].tolist()) < OPEN_RAD**2:
+    if last is None or not _open(last):
         return tuple(sightings)
     cameras = {sighting.camera for sighting in sightings}
     if len(cameras) < 2:
@@ -73,6 +73,12 @@ class Quarrel:
         if self._accused != camera:
             self._accused, self._since_ns = camera, t_ns
         return t_ns <= self._since_ns  # the same images may be looked at again
+
+
+def _open(state: State) -> bool:
+    """Say whether a turn is open: P.item spares arrays of three numbers in every round."""
+    variance, first = state.P.item, ATTITUDE.start
+    return max(variance(i, i) for i in range(first, first + 3)) >= OPEN_RAD**2
 
 
 def _denied(ball: int, seen: Mapping[int, Collection[int]]) -> bool:

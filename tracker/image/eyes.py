@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -84,7 +83,7 @@ class Eyes:
     def suppose(self, gains: Sequence[Gains]) -> None:
         """Take the light in each camera to be so."""
         for index, one in enumerate(gains):
-            self._light_up(index, replace(self._tints[index], gains=one))
+            self._light_up(index, self._tints[index]._replace(gains=one))
 
     def _light_up(self, index: int, tint: Tint) -> None:
         """Take the light in one camera to be so; the colours looked for change in few, large steps."""

@@ -161,7 +161,7 @@ def _find_balls(frame: Frame, rig: Rig, state: State, gaze: Gaze, look: Look) ->
             continue
         templates = serve(b, view, appearance)
         drawn.append(templates)
-        failed = find_ball(image, room, colours[b], rows[b], known, templates, fits[b])
+        failed = find_ball(image, room, b, colours[b], rows, known, templates, fits)
         if failed is None:
             row_ns = t_ns + round(eye.delay_ns(fits[b, UV][1])) if eye.readout_ns else t_ns
             look.sightings.append(BallSighting(camera, b, row_ns, uvs_px[b], covs_px2[b]))

@@ -49,27 +49,29 @@ def known_of(response: Response) -> Known:
 def find_ball(
     image: Image,
     room: Room,
+    ball: int,
     colour: ColourTable,
-    view: Array,
+    views: Array,
     known: Known,
     drawn: tuple[Template, Template],
-    fit: Array,
+    fits: Array,
 ) -> Reason | None:
     """Find a ball near a prediction and fit its centre.
 
     Args:
         image: (height, width, 3) BGR.  room: what is known to stand behind.
+        ball: its row in `views` and `fits`.
         colour: of this ball alone.
-        view: a row of `view.expected_views`, finite.
+        views: of `view.expected_views`, its row finite.
         known: of the camera.
         drawn: the templates of its brightness and of its colour.
-        fit (SIZE,): filled in.
+        fits (balls, SIZE): its row is filled in.
     Returns:
         None; NO_BALL when nothing of its colour and size is there but noise, or the fit runs away; AT_BORDER when it is
         cut off.
     """
     luma, chroma = drawn
-    status = _find_and_fit(image, room.mean, room.looks, *colour, view, *known, *luma, *chroma, fit)
+    status = _find_and_fit(image, room.mean, room.looks, ball, *colour, views, *known, *luma, *chroma, fits)
     return None if status == _FOUND else _REASONS[status]
 
 
@@ -147,19 +149,19 @@ def _nearest_spot(
 
 
 @compiled(
-    "i8(Array(u1, 3, 'C', True), Array(f4, 3, 'C'), Array(u1, 2, 'C'),"
+    "i8(Array(u1, 3, 'C', True), Array(f4, 3, 'C'), Array(u1, 2, 'C'), i8,"
     "Array(i2, 2, 'C', True), Array(i2, 1, 'C', True), Array(b1, 2, 'C', True), i8, i8,"
-    "f8[::1], f8[::1], i8, f8[::1], f8[::1], Array(f4, 3, 'C', True), f8[::1], Array(f4, 3, 'C', True), f8[::1],"
-    "f8[::1])"
+    "f8[:, ::1], f8[::1], i8, f8[::1], f8[::1], Array(f4, 3, 'C', True), f8[::1], Array(f4, 3, 'C', True), f8[::1],"
+    "f8[:, ::1])"
 )
 def _find_and_fit(
-    image: Image, room: NDArray[np.float32], looks: NDArray[np.uint8],
+    image: Image, room: NDArray[np.float32], looks: NDArray[np.uint8], ball_index: int,
     least_spread: NDArray[np.int16], lowest_spread: NDArray[np.int16], hues: NDArray[np.bool_],
-    blue: int, red: int, view: Array, answers: Array, block: int, light: Array, trust: Array,
-    luma: NDArray[np.float32], luma_made: Array, chroma: NDArray[np.float32], chroma_made: Array, fit: Array,
+    blue: int, red: int, views: Array, answers: Array, block: int, light: Array, trust: Array,
+    luma: NDArray[np.float32], luma_made: Array, chroma: NDArray[np.float32], chroma_made: Array, fits: Array,
 ) -> int:  # fmt: skip
-    """Find the spot nearest the prediction, cut its pixels out and fit them; fill in fit (SIZE,), say how it went."""
-    height, width = image.shape[0], image.shape[1]
+    """Find the spot nearest the prediction, cut its pixels out and fit them; fill in a row of fits, say how it went."""
+    height, width, view, fit = image.shape[0], image.shape[1], views[ball_index], fits[ball_index]
     spot_u, spot_v = _nearest_spot(image, least_spread, lowest_spread, hues, blue, red, view)
     if np.isnan(spot_u):
         return _NO_COLOUR
