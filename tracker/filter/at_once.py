@@ -26,25 +26,25 @@ def fit_at_once(ahead: Prediction, seen: Sighted, rig: Rig, probability: float) 
     if ahead.turn_open:
         return None
     process, state = ahead.process, ahead.state
-    plain, levels, P, dx, y, H, R, u, inverse, nis = _at_once(
+    plain, levels, P, dx, H, R, u, inverse, nis = _at_once(
         state.mean, state.P, ahead.P_coasted, ahead.dt, process.manoeuvre_s, seen.z, seen.covs_px, state.noise,
         seen.cameras, seen.balls, seen.lags_s, camera_table(rig), ahead.points_of(rig), envelope(process),
         chi2_limit(probability, 2), state.levels, strengths(process), tilt_variance(ahead),
     )  # fmt: skip
-    if not plain or nis > chi2_limit(probability, len(u)):
+    if not (plain and nis <= chi2_limit(probability, len(u))):
         return None
-    return Fit(seen, dx, P, levels, y, H, R, u, inverse, nis)
+    return Fit(seen, dx, P, levels, H, R, u, inverse, nis)
 
 
-@compiled("Tuple((b1, f8[:, ::1], f8[:, ::1], f8[::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8))"
+@compiled("Tuple((b1, f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8))"
           "(f8[::1], f8[:, ::1], f8[:, ::1], f8, f8, f8[::1], f8[:, ::1], f8[:, ::1], i8[::1], i8[::1], f8[::1],"
           " f8[:, ::1], f8[:, ::1], f8[::1], f8, f8[:, ::1], f8[:, ::1], f8)")  # fmt: skip
 def _at_once(
     mean: Array, P: Array, P_coasted: Array, dt: float, T: float, z: Array, covs_px: Array, noise: Array,
     cameras: Indices, balls: Indices, lags_s: Array, table: Array, points_inB: Array, tops: Array, limit: float,
     levels: Array, of: Array, tilt: float,
-) -> tuple[bool, Array, Array, Array, Array, Array, Array, Array, Array, float]:  # fmt: skip
-    """Return whether nothing is to be chosen, and of the fit levels, P, dx, y, H, R, u, inverse and nis.
+) -> tuple[bool, Array, Array, Array, Array, Array, Array, Array, float]:  # fmt: skip
+    """Return whether nothing is to be chosen, and of the fit levels, P, dx, H, R, u, inverse and nis.
 
     Arguments as `compared`, `distances2` and `prepared` take them; limit: of a sighting's squared distance.
     """
@@ -55,7 +55,5 @@ def _at_once(
     for distance2 in distances2(y, A, B, tops):
         near = near and distance2 <= limit
     levels, P, R, doubtful = prepared(levels, of, y, A, B, R, path, doubt, P_coasted, dt, T, tilt, True, False)
-    stands, turn_open, dx, y, H, u, inverse, nis = solved(
-        mean, P, T, z, R, cameras, balls, lags_s, table, points_inB
-    )  # fmt: skip
-    return near and stands and not (doubtful or turn_open), levels, P, dx, y, H, R, u, inverse, nis
+    stands, turn_open, dx, H, u, inverse, nis = solved(mean, P, T, z, R, cameras, balls, lags_s, table, points_inB)
+    return near and stands and not (doubtful or turn_open), levels, P, dx, H, R, u, inverse, nis

@@ -165,10 +165,13 @@ def _left_out(sighting: BallSighting, rig: Rig, distance2: float, where: str) ->
 
 
 def _posterior(ahead: Prediction, best: Fit) -> State:
-    """Take the likeliest state, and the covariance of one linear step there from the prior, by filterpy."""
+    """Take the likeliest state, and the covariance of one linear step there from the prior, by filterpy.
+
+    Of a measurement's value that covariance knows nothing, so the step is given none.
+    """
     prior, step = ahead.state, _linear_step(len(best.P), get_ident())
     step.x, step.P, step.R = np.zeros((len(best.P), 1)), best.P, best.R
-    step.update(best.y[:, None], H=best.H)
+    step.update(0.0, H=best.H)
     mean, P, noise = settled(
         prior.mean, best.P, ahead.dt, best.H, best.dx, step.P, prior.noise, best.sighted.cameras, best.u, best.inverse
     )

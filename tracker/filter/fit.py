@@ -30,7 +30,7 @@ class Fit(NamedTuple):
     """A fit of some sightings: the error dx found, and what leads there from the prior by one linear update.
 
     P: prior covariance with the manoeuvre's noise in it.  levels: of the manoeuvre, after these sightings.
-    y (2n + 2,), H, R: innovation, slope and covariance of the sightings, then of the tilt.
+    H (2n + 2, size), R: slope and covariance of the sightings, then of the tilt.
     u, inverse: S^-1 y and S^-1 of the sightings.  nis: y' S^-1 y.
     """
 
@@ -38,7 +38,6 @@ class Fit(NamedTuple):
     dx: Array
     P: Array
     levels: Array
-    y: Array
     H: Array
     R: Array
     u: Array
@@ -142,18 +141,18 @@ def _likelier(agreed: Fit | None, doubted: Fit | None) -> Fit | None:
 
 def _fitted(ahead: Prediction, batch: Batch, rig: Rig, levels: Array, P: Array, R: Array) -> Fit | None:
     """Fit with a given prior covariance P and noise R; None when the fit runs away."""
-    stands, turn_open, dx, y, H, u, inverse, nis = _solve(ahead, batch.sighted, rig, P, R)
+    stands, turn_open, dx, H, u, inverse, nis = _solve(ahead, batch.sighted, rig, P, R)
     if stands and turn_open:
         bend = _bend(ahead, batch.sighted, rig, dx, P, H, R)
         if bend is not None:
             n, R = len(bend), R.copy()
             R[:n, :n] += bend
-            stands, _, dx, y, H, u, inverse, nis = _solve(ahead, batch.sighted, rig, P, R)
-    return Fit(batch.sighted, dx, P, levels, y, H, R, u, inverse, nis) if stands else None
+            stands, _, dx, H, u, inverse, nis = _solve(ahead, batch.sighted, rig, P, R)
+    return Fit(batch.sighted, dx, P, levels, H, R, u, inverse, nis) if stands else None
 
 
-Solution = tuple[bool, bool, Array, Array, Array, Array, Array, float]
-"""Whether there is one; whether it leaves a turn open; dx, y, H, u, inverse and nis of a `Fit`."""
+Solution = tuple[bool, bool, Array, Array, Array, Array, float]
+"""Whether there is one; whether it leaves a turn open; dx, H, u, inverse and nis of a `Fit`."""
 
 
 def _solve(ahead: Prediction, seen: Sighted, rig: Rig, P: Array, R: Array) -> Solution:
@@ -163,7 +162,7 @@ def _solve(ahead: Prediction, seen: Sighted, rig: Rig, P: Array, R: Array) -> So
     )  # fmt: skip
 
 
-@compiled("Tuple((b1, b1, f8[::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], f8))(f8[::1], f8[:, ::1], f8, f8[::1],"
+@compiled("Tuple((b1, b1, f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], f8))(f8[::1], f8[:, ::1], f8, f8[::1],"
           " f8[:, ::1], i8[::1], i8[::1], f8[::1], f8[:, ::1], f8[:, ::1])")  # fmt: skip
 def solved(
     mean: Array, P: Array, T: float, z: Array, R: Array, cameras: Indices, balls: Indices, lags_s: Array,
@@ -173,7 +172,7 @@ def solved(
     dx, y, H, variances = likeliest(mean, P, T, z, R, cameras, balls, lags_s, table, points_inB)
     u, inverse, nis = weighed(y, H, P, R)
     turn_open = variances[ATTITUDE].max() > LEAST_OPEN_TURN_RAD**2 / 3.0
-    return np.isfinite(dx).all(), turn_open, dx, y, H, u, inverse, nis
+    return np.isfinite(dx).all(), turn_open, dx, H, u, inverse, nis
 
 
 def _bend(ahead: Prediction, seen: Sighted, rig: Rig, dx: Array, P: Array, H: Array, R: Array) -> Array | None:
