@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable
-from typing import ParamSpec, TypeVar
+from typing import TypeVar, TypeVarTuple
 
 from bridge.alarms import Alarm
 from bridge.clock import Nanoseconds
@@ -18,7 +18,7 @@ from bridge.telemetry.states import Surroundings
 from bridge.wire import LinkState, Message, Sent
 from tracker.types import Estimate, Event, Step
 
-P = ParamSpec("P")
+Ts = TypeVarTuple("Ts")
 R = TypeVar("R")
 WAIT = "wait"  # of the tracker's stages the one that is no work
 
@@ -30,11 +30,11 @@ class Stages:
         self._stopwatch = stopwatch
         self._running: defaultdict[str, int] = defaultdict(int)
 
-    def time(self, stage: str, call: Callable[P, R], *args: P.args, **kwargs: P.kwargs) -> R:
+    def time(self, stage: str, call: Callable[[*Ts], R], *args: *Ts) -> R:
         """Call and add the time it took to the stage's."""
         stopwatch, running = self._stopwatch, self._running
         started_ns = stopwatch()
-        result = call(*args, **kwargs)
+        result = call(*args)
         running[stage] += stopwatch() - started_ns
         return result
 
