@@ -27,7 +27,7 @@ class Rounds:
         self._shared = [deque([everyone], maxlen=MEMORY) for _ in range(camera_count)]
         self._companions = [everyone for _ in range(camera_count)]  # of `_shared`, all together
         self._open: dict[int, Frame] = {}
-        self._opened_ns = 0  # the first stamp in it
+        self._opened_ns = self._newest_ns = 0  # the first stamp in it, and the last
         self._closed_ns = -(2**63)
         self._closed: frozenset[int] = frozenset()
 
@@ -38,7 +38,10 @@ class Rounds:
             return [self._close()] if self._open else []
         if self._open and (event.camera in self._open or not self._one_instant(event)):
             closed.append(self._close())
-        self._opened_ns = min(self._opened_ns, event.t_ns) if self._open else event.t_ns
+        if self._open:
+            self._opened_ns, self._newest_ns = min(self._opened_ns, event.t_ns), max(self._newest_ns, event.t_ns)
+        else:
+            self._opened_ns = self._newest_ns = event.t_ns
         self._open[event.camera] = event
         if self._expected() <= self._open.keys():
             closed.append(self._close())
@@ -49,7 +52,7 @@ class Rounds:
         return [self._close()] if self._open else []
 
     def _one_instant(self, frame: Frame) -> bool:
-        return all(abs(frame.t_ns - other.t_ns) <= self._window_ns for other in self._open.values())
+        return self._newest_ns - self._window_ns <= frame.t_ns <= self._opened_ns + self._window_ns
 
     def _stragglers_of(self) -> frozenset[int]:
         """Return the cameras of the last closed round, if the open one is of the same instant."""
@@ -67,6 +70,6 @@ class Rounds:
             self._shared[camera].append(together)
             if self._companions[camera] != together:
                 self._companions[camera] = NOBODY.union(*self._shared[camera])
-        self._closed, self._closed_ns = together, max([frame.t_ns for frame in frames])
+        self._closed, self._closed_ns = together, self._newest_ns
         self._open = {}
         return frames

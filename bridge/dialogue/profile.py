@@ -46,14 +46,14 @@ PROFILES: Mapping[str, Profile] = MappingProxyType(
 
 AUTO = "auto"
 WITHOUT_COUNTER = "ATT_POS_MOCAP"
+_OWN = MappingProxyType({Autopilot.ARDUPILOT: "ardupilot", Autopilot.PX4: "px4"})
 
 
 def profile_for(chosen: str, autopilot: Autopilot | None) -> Profile:
     """Return the profile of a config's choice; `auto` goes by the autopilot, unknown ones are `generic`."""
     if chosen != AUTO:
         return PROFILES[chosen]
-    known = {Autopilot.ARDUPILOT: "ardupilot", Autopilot.PX4: "px4"}
-    return PROFILES["generic" if autopilot is None else known.get(autopilot, "generic")]
+    return PROFILES["generic" if autopilot is None else _OWN.get(autopilot, "generic")]
 
 
 def kept_apart(messages: tuple[str, ...], autopilot: Autopilot) -> tuple[str, ...]:

@@ -73,6 +73,8 @@ class TlogWriter:
         """
         if entry.wall_ns is not None:
             self._wall_less_stream_ns = entry.wall_ns - entry.now_ns
+        if not (entry.sent or entry.heard.received):
+            return
         frames = [(entry.now_ns, sent.link, sent.raw) for sent in entry.sent]
         if entry.heard.received:
             heard = [(message.arrived_ns, link, message.raw) for link, message in entry.heard.received]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -47,8 +48,14 @@ def sighted(sightings: tuple[BallSighting, ...], t_ns: int) -> Sighted:
     seen_by, seen, stamps_ns, uvs_px, covs_px2 = zip(*sightings, strict=True)
     lags_s = np.array([(stamp_ns - t_ns) * 1e-9 for stamp_ns in stamps_ns])
     return Sighted(
-        sightings, np.array(seen_by), np.array(seen), lags_s, np.concatenate(uvs_px), np.concatenate(covs_px2)
+        sightings, _indices(seen_by), _indices(seen), lags_s, np.concatenate(uvs_px), np.concatenate(covs_px2)
     )  # fmt: skip
+
+
+@lru_cache(maxsize=256)
+def _indices(numbers: tuple[int, ...]) -> Indices:
+    """Return numbers as an array, only to be read: nearly every round sees the same balls in the same cameras."""
+    return np.array(numbers)
 
 
 class Batch(NamedTuple):

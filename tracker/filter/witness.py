@@ -76,9 +76,9 @@ class Quarrel:
 
 
 def _open(state: State) -> bool:
-    """Say whether a turn is open: P.item spares arrays of three numbers in every round."""
-    variance, first = state.P.item, ATTITUDE.start
-    return max(variance(i, i) for i in range(first, first + 3)) >= OPEN_RAD**2
+    """Say whether a turn is open."""
+    variance, i = state.P.item, ATTITUDE.start
+    return max(variance(i, i), variance(i + 1, i + 1), variance(i + 2, i + 2)) >= OPEN_RAD**2
 
 
 def _denied(ball: int, seen: Mapping[int, Collection[int]]) -> bool:

@@ -23,6 +23,12 @@ def _radii(rig: Rig) -> Array:
     return np.array([ball.radius_m for ball in rig.marker.balls])
 
 
+@lru_cache(maxsize=16)
+def _focals_px(rig: Rig) -> tuple[float, ...]:
+    """Return each camera's focal length [px]."""
+    return tuple(camera.focal_px for camera in rig.cameras)
+
+
 def expected_views(state: State, rig: Rig, camera: int, t_ns: int) -> Array:
     """Return what a camera is expected to see, a row each ball, for a frame that the camera stamped t_ns.
 
@@ -35,7 +41,7 @@ def expected_views(state: State, rig: Rig, camera: int, t_ns: int) -> Array:
     """
     lag_s = (t_ns - state.t_ns) * 1e-9
     table, points, seen_by = camera_table(rig), marker_points(rig), rig.cameras[camera]
-    radii_m, focal_px = _radii(rig), seen_by.focal_px
+    radii_m, focal_px = _radii(rig), _focals_px(rig)[camera]
     views = _views(state.mean, state.manoeuvre_s, state.P, camera, lag_s, table, points, radii_m, focal_px)
     return _rolled(views, seen_by) if seen_by.readout_ns else views
 
