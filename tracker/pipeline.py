@@ -243,9 +243,10 @@ class Tracker:
     def _hardly_seen(self, found: Update) -> bool:
         """Say whether for a while fewer sightings were made than make a pose: what seems another is soon a mistake."""
         seen_ns = self._seen_ns
-        for camera, ball, t_ns, _, _ in found.used:
-            if seen_ns.get((camera, ball), t_ns) <= t_ns:
-                seen_ns[camera, ball] = t_ns
+        for sighting in found.used:
+            of, t_ns = sighting[:2], sighting.t_ns
+            if seen_ns.get(of, t_ns) <= t_ns:
+                seen_ns[of] = t_ns
         newest_ns = max(seen_ns.values())
         lately = [ball for (_, ball), t_ns in seen_ns.items() if newest_ns - t_ns <= POSED_NS]
         return len(lately) < POSED or len(set(lately)) < 2

@@ -95,7 +95,7 @@ class Study:
         found = self.update(ahead, sightings)
         harvest.find_ns += looked_ns - started_ns
         harvest.filter_ns += self._stopwatch() - looked_ns
-        looking = [frame.camera for frame in frames]
+        looking = (frame.camera for frame in frames)
         if isinstance(found, Update) and too_lonely(found.used, looking, len(self._rig.marker)):
             detail = f"camera {found.used[0].camera} shows {len(found.used)} of the balls, and no other one any"
             found = Rejected(Reason.ALONE, detail, ahead.state.t_ns)

@@ -10,7 +10,7 @@ the past does, an honest one that shows a sudden turn does not.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -22,7 +22,7 @@ WITNESSES = 2  # balls that a camera must see to bear witness against one more: 
 DOUBT_PX = 1.5  # one sigma: half a ball's radius and more
 
 
-def too_lonely(used: Sequence[BallSighting], looking: Collection[int], balls: int) -> bool:
+def too_lonely(used: Sequence[BallSighting], looking: Iterable[int], balls: int) -> bool:
     """Say whether an update rests on too little: some of the balls in one camera, where another looked and saw none.
 
     One camera's two balls are four figures for six of a pose, and a thing of a ball's colour makes a pose of its own.
@@ -30,8 +30,7 @@ def too_lonely(used: Sequence[BallSighting], looking: Collection[int], balls: in
     Args:
         used: the sightings of one instant.  looking: the cameras that gave a frame of it.  balls: of the marker.
     """
-    cameras = {sighting.camera for sighting in used}
-    return len(cameras) == 1 and len(set(looking)) > 1 and len(used) < balls
+    return len(used) < balls and len({sighting.camera for sighting in used}) == 1 and len(set(looking)) > 1
 
 
 def doubted_alone(sightings: Sequence[BallSighting], last: State | None) -> tuple[BallSighting, ...]:
@@ -64,10 +63,11 @@ class Quarrel:
         seen: sightings of one instant.  used: those of them that the update believes.
         """
         believed = {sighting.camera for sighting in used}
-        against = [sighting for sighting in seen if sighting.camera not in believed]
         if len(believed) > 1:
             self._accused = None
-        if len(believed) > 1 or len(against) < WITNESSES:
+            return False
+        against = [sighting for sighting in seen if sighting.camera not in believed]
+        if len(against) < WITNESSES:
             return False
         camera, _, t_ns, *_ = against[0]
         if self._accused != camera:

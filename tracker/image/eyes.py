@@ -156,11 +156,10 @@ class Eyes:
             cameras = [cameras[self._turn % len(cameras)]]
         for camera in cameras:
             frame, views, fits, *_ = look.glances[camera]
-            fitted = [(one.ball, fits[one.ball].tolist()) for one in seen if one.camera == camera]
-            colours = [
-                (ball, core_colour(frame.image, fit[0], fit[1], views[ball][RADIUS]))
-                for ball, fit in fitted
-                if fit[MISFIT] <= MISFIT_MAX
-            ]
+            found, colours = fits.tolist(), []
+            for one in seen:
+                u, v, misfit = found[one.ball][0], found[one.ball][1], found[one.ball][MISFIT]
+                if one.camera == camera and misfit <= MISFIT_MAX:
+                    colours.append((one.ball, core_colour(frame.image, u, v, views[one.ball][RADIUS])))
             if len(colours) >= LIGHT_BALLS:
                 self._light_up(camera, self._tints[camera].learned(colours))
