@@ -47,10 +47,10 @@ class Hearer:
     def take(self, outlet: Outlet, now_ns: int, *, last: bool = False) -> Heard:
         """Return what is new at stream time now_ns [ns]; last: nothing comes after this, so all is told."""
         came = outlet.received()
-        received, left_out = came[-MOST:], max(0, len(came) - MOST)
         due = last or self._due_ns is None or not 0 <= self._due_ns - now_ns <= LOOK_NS
         if not due and not came:
             return NOTHING
+        received, left_out = came[-MOST:], max(0, len(came) - MOST)
         if not due and not any(message.message == TIMESYNC for _, message in came):
             return Heard(received, left_out=left_out)
         states = outlet.link_states()
