@@ -80,7 +80,7 @@ class Study:
             used = {(sighting.camera, sighting.ball) for sighting in found.used}
             taught = [one for one in look.sightings if (one.camera, one.ball) in used]
             harvest.refused += [one for one in look.sightings if (one.camera, one.ball) not in used]
-        self._eyes.learn(look, taught, blindly=blindly)
+        self._eyes.learn(look, taught, found.state, blindly=blindly)
         self._eyes.look_behind(frames, found.state)
         return found
 

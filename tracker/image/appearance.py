@@ -9,6 +9,7 @@ import numpy as np
 
 from tracker.camera import Camera
 from tracker.image.centre import Centre
+from tracker.image.holder import without_holders
 from tracker.image.lesson import light_on, sample_of, sharper
 from tracker.image.light import Light, ray_frame
 from tracker.image.patch import Expected, Response, cut, detail_of, extent_of
@@ -64,7 +65,7 @@ class Appearance:
             return self
         extent = extent_of(ball)
         centre = float(found.uv_px[0]) - extent.u, float(found.uv_px[1]) - extent.v
-        sample = sample_of(cut(image, extent, ball), ball, centre)
+        sample = sample_of(without_holders(cut(image, extent, ball), extent, ball), ball, centre)
         response = sharper(sample, max(BLUR_STEP_PX, FIRST_STEP_PX / (1.0 + self.light.count / 3.0)))
         detail = response.detail + DETAIL_SHARE * (detail_of(image, extent) - response.detail)
         response = replace(response, detail=detail)

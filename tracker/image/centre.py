@@ -17,7 +17,7 @@ import numpy as np
 
 from tracker.image.at_centre import squares_at
 from tracker.image.evidence import LEAST_EVIDENCE
-from tracker.image.holder import without_holder
+from tracker.image.holder import without_holders
 from tracker.image.newton import FIT_SIZE, gauss_newton
 from tracker.image.patch import Expected, Patch, cut, extent_of, fits_in
 from tracker.image.reading import LUMA_VAR
@@ -55,13 +55,12 @@ def templates_of(ball: Expected) -> tuple[Template, Template]:
     return luma, template_for(ball.radius_px, r.chroma_px, ball.shades, r.block_px)
 
 
-def fit_centre(image: Image, ball: Expected, held_px: tuple[float, float] | None = None) -> Centre | Reason:
+def fit_centre(image: Image, ball: Expected) -> Centre | Reason:
     """Fit the centre of a ball.
 
     Args:
         image: (height, width, 3) BGR.
         ball: what is known of it.
-        held_px: where in the image the tube leads to that holds it, which is left out; None where that is not known.
     Returns:
         Centre; AT_BORDER when its patch leaves the image, NO_BALL when nothing is there or the fit runs away.
     Source: Golub, Pereyra, "Separable nonlinear least squares", Inverse Problems 19 (2003), with Kaufman's
@@ -70,9 +69,7 @@ def fit_centre(image: Image, ball: Expected, held_px: tuple[float, float] | None
     extent = extent_of(ball)
     if not fits_in(image, extent):
         return Reason.AT_BORDER
-    patch, fit = cut(image, extent, ball), np.empty(FIT_SIZE)
-    if held_px is not None:
-        patch = without_holder(patch, extent, ball, held_px)
+    patch, fit = without_holders(cut(image, extent, ball), extent, ball), np.empty(FIT_SIZE)
     luma, chroma = templates_of(ball)
     gauss_newton(patch.bright, patch.colour, *luma, *chroma, numbers_of(ball), extent.du, extent.dv, fit)
     du, dv, cov_uu, cov_uv, cov_vv, misfit, evidence = fit.tolist()

@@ -11,6 +11,7 @@ from tracker.image.album import Album
 from tracker.image.appearance import MISFIT_MAX, Appearance
 from tracker.image.behind import Behind
 from tracker.image.look import Look, gaze_of, look_near
+from tracker.image.mounting import Mounting
 from tracker.image.rivals import first_rivals
 from tracker.image.sight import MISFIT
 from tracker.image.tint import Gains, Tint, core_colour
@@ -24,6 +25,7 @@ LEARN_ALL = 108  # balls of each camera under its gamma; then
 LEARN_EVERY = 5  # rounds one ball: odd, for free-running cameras have rounds in turn
 BLIND_PX = 0.5  # of the streak's sigma: how fast the balls move is not known
 SMEAR_DOUBT = 0.1  # of an unknown smear: what it moves the centre of a shaded ball, one sigma
+SMEARED = 0.5  # radii: a ball smeared further leaves something at the ends of its streak
 LONG_STREAK_PX = 0.7  # an image smeared further than this, taken for a still one, teaches wrong
 
 
@@ -41,6 +43,7 @@ class Eyes:
         self._albums = [Album(camera) for camera in rig.cameras]
         self._behind = [Behind(camera) for camera in rig.cameras]
         self._tints = [Tint() for _ in rig.cameras]
+        self._mounting = Mounting(rig.marker)
         self._gazes = [
             gaze_of(rig, Appearance(), album, room=behind.room)
             for album, behind in zip(self._albums, self._behind, strict=True)
@@ -96,7 +99,7 @@ class Eyes:
         whose = self._may_draw(frames)
         for index, album in enumerate(self._albums):
             album.draws_left = int(index == whose) if self._settled else None
-        look = look_near(frames, self._rig, state, self._gazes)
+        look = look_near(frames, self._rig, state, self._gazes, self._mounting.things)
         smear_px = self._smear_px(state)
         look.blind = smear_px > BLIND_PX
         return look.doubted(SMEAR_DOUBT * smear_px) if look.blind else look
@@ -114,10 +117,10 @@ class Eyes:
         """Return one sigma of how far the balls' images may be smeared that the state does not know of [px]."""
         return unknown_streak_px(state, self._rig, self._exposures_s)
 
-    def learn(self, look: Look, seen: Sequence[BallSighting], *, blindly: bool) -> None:
+    def learn(self, look: Look, seen: Sequence[BallSighting], state: State, *, blindly: bool) -> None:
         """Learn how balls look: from every one at first, then from one in turn every few rounds.
 
-        seen: sightings of the look that fitted.
+        seen: sightings of the look that fitted.  state: of about their time.
         blindly: how fast they moved was not known. It is better than nothing, and forgotten if they did move.
         """
         self._turn += 1
@@ -137,6 +140,8 @@ class Eyes:
             camera, image = self._rig.cameras[index], one.frame.image
             expected = one.expected(camera, self._behind[index].room)
             self._rivals[index] = self._rivals[index].learned(image, camera, expected, one.centre)
+            if one.streak_px < SMEARED * expected.radius_px:
+                self._mounting.learn(image, expected, one.sighting.ball, one.centre, camera.R_CtoW.T @ state.R_BtoW)
         self._sum_up()
 
     def look_behind(self, frames: Sequence[Frame], state: State) -> None:

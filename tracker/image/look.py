@@ -10,12 +10,14 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.camera import Camera
+from tracker.filter.measure import camera_table
 from tracker.image.album import Album
 from tracker.image.appearance import Appearance
 from tracker.image.behind import NO_ROOM, Room
 from tracker.image.centre import Centre
 from tracker.image.colour_table import ColourTable, colours_of_each
 from tracker.image.detect import Blob, find_blobs
+from tracker.image.mounting import things_seen
 from tracker.image.patch import Expected
 from tracker.image.sight import COV, MISFIT, SIZE, SPOT, UV, Known, find_ball, known_of, read_ahead
 from tracker.image.template import Template
@@ -32,7 +34,7 @@ class Fitted(NamedTuple):
     """A sighting, and what `Appearance` learns from.
 
     view: a row of `view.expected_views`.  fit (sight.SIZE,): what was found.
-    appearance, drawn: what it was taken to look like.
+    appearance, drawn: what it was taken to look like.  held: see `Expected.held`.
     """
 
     sighting: BallSighting
@@ -41,13 +43,15 @@ class Fitted(NamedTuple):
     fit: Array
     appearance: Appearance
     drawn: tuple[Template, Template]
+    held: Array
 
     def expected(self, camera: Camera, room: Room = NO_ROOM) -> Expected:
         """Return what was expected of the ball, from its coloured spot's middle. camera: the frame's."""
         view, (u, v) = self.view, self.fit[SPOT].tolist()
         ray, speed_px_s = (view[RAY_X], view[RAY_Y]), (view[SPEED_U], view[SPEED_V])
         shades = self.appearance.shades(camera, *ray)
-        return Expected((u, v), view[RADIUS], speed_px_s, shades, self.appearance.response, self.drawn, ray, room)
+        response = self.appearance.response
+        return Expected((u, v), view[RADIUS], speed_px_s, shades, response, self.drawn, ray, room, self.held)
 
     @property
     def streak_px(self) -> float:
@@ -65,6 +69,7 @@ class Glance(NamedTuple):
 
     views: rows of `view.expected_views`.  fits (balls, sight.SIZE): of those that were found.
     appearance, drawn: what they were taken to look like; no templates where a ball was not looked for.
+    held (balls, any, 3): see `Expected.held`.
     """
 
     frame: Frame
@@ -72,6 +77,7 @@ class Glance(NamedTuple):
     fits: Array
     appearance: Appearance
     drawn: Sequence[tuple[Template, Template] | None]
+    held: Array
 
 
 @dataclass(slots=True, eq=False)
@@ -92,7 +98,9 @@ class Look:
         drawn = glance.drawn[ball]
         if drawn is None:
             raise ValueError(f"ball {ball} was not looked for by camera {sighting.camera}")
-        return Fitted(sighting, glance.frame, glance.views[ball], glance.fits[ball], glance.appearance, drawn)
+        return Fitted(
+            sighting, glance.frame, glance.views[ball], glance.fits[ball], glance.appearance, drawn, glance.held[ball]
+        )
 
     def doubted(self, sigma_px: float) -> Look:
         """Return it with sightings that are less sure, by one sigma on each axis [px]."""
@@ -128,31 +136,33 @@ def gaze_of(rig: Rig, appearance: Appearance, album: Album, gains: Gains = NEUTR
     return Gaze(appearance, known_of(appearance.response), colours, album, undoing, room)
 
 
-def look_near(frames: Sequence[Frame], rig: Rig, state: State, gazes: Sequence[Gaze]) -> Look:
+def look_near(frames: Sequence[Frame], rig: Rig, state: State, gazes: Sequence[Gaze], things: Array) -> Look:
     """Find each ball in each image, in the region where a state, with its covariance, expects it.
 
     Args:
         frames: of different cameras, at about one time.
         state: carried to about that time.
         gazes: of each camera of the rig.
+        things: about the balls, see `Mounting.things`.
     """
     look = Look()
     for frame in frames:
-        _find_balls(frame, rig, state, gazes[frame.camera], look)
+        _find_balls(frame, rig, state, gazes[frame.camera], things, look)
     return look
 
 
-def _find_balls(frame: Frame, rig: Rig, state: State, gaze: Gaze, look: Look) -> None:
+def _find_balls(frame: Frame, rig: Rig, state: State, gaze: Gaze, things: Array, look: Look) -> None:
     """Add each ball of the marker as seen in one image near its prediction, or why it is not."""
     image, camera, t_ns, appearance = frame.image, frame.camera, frame.t_ns, gaze.appearance
     room, known, colours, serve, eye = gaze.room, gaze.known, gaze.colours, gaze.album.serve, rig.cameras[camera]
     rows = expected_views(state, rig, camera, t_ns)
     read_ahead(image, room.mean, rows)
+    held = things_seen(state.mean, camera_table(rig)[camera], rows, things)
     views, fits = rows.tolist(), np.empty((len(rows), SIZE))
     drawn: list[tuple[Template, Template] | None] = []
     fixed = fits.view()
     fixed.flags.writeable = False
-    look.glances[camera] = Glance(frame, views, fixed, appearance, drawn)
+    look.glances[camera] = Glance(frame, views, fixed, appearance, drawn, held)
     uvs_px, covs_px2 = fixed[:, UV], fixed[:, COV].reshape(-1, 2, 2)
     for b, view in enumerate(views):
         if not (math.isfinite(view[U] + view[V]) and view[DEPTH] >= NEAREST_M):
@@ -161,7 +171,7 @@ def _find_balls(frame: Frame, rig: Rig, state: State, gaze: Gaze, look: Look) ->
             continue
         templates = serve(b, view, appearance)
         drawn.append(templates)
-        failed = find_ball(image, room, b, colours[b], rows, known, templates, fits)
+        failed = find_ball(image, room, b, colours[b], rows, known, templates, held, fits)
         if failed is None:
             row_ns = t_ns + round(eye.delay_ns(fits[b, UV][1])) if eye.readout_ns else t_ns
             look.sightings.append(BallSighting(camera, b, row_ns, uvs_px[b], covs_px2[b]))

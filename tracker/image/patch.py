@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
@@ -34,6 +34,7 @@ FULL_DETAIL = 0.75  # above this share of what neighbours of different blocks di
 X, Y, TRUST, LUMA = range(4)
 BLUE, RED = 3, 4
 PLANE = 3  # terms of the background
+NOT_HELD: Array = np.empty((0, 3))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,6 +82,7 @@ class Expected:
     speed_px_s: how fast its image moves.  shades: see `template.Shades`.  response: its camera's.
     drawn: templates of its brightness and its colour that serve for it; None for those of its own.
     ray: (x, y, 1) leads to it from the camera; None where uv_px must tell.  room: what is known to stand behind.
+    held (any, 3): what holds it, see `holder.EXCESS`.
     """
 
     uv_px: tuple[float, float]
@@ -91,6 +93,7 @@ class Expected:
     drawn: tuple[Template, Template] | None = None
     ray: tuple[float, float] | None = None
     room: Room = NO_ROOM
+    held: Array = field(default_factory=lambda: NOT_HELD)
 
     @property
     def streak_px(self) -> Streak:

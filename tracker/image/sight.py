@@ -11,6 +11,7 @@ from tracker.image.behind import Room
 from tracker.image.centre import MAX_SHIFT_PX
 from tracker.image.colour_table import ColourTable
 from tracker.image.evidence import LEAST_EVIDENCE
+from tracker.image.holder import distrust
 from tracker.image.newton import EVIDENCE, FIT_SIZE, gauss_newton
 from tracker.image.patch import Response, cut_pixels, light_of, trust_of
 from tracker.image.reading import BALL_SIZE, CHROMA_VAR, LUMA_VAR, STREAK_U, STREAK_V
@@ -54,6 +55,7 @@ def find_ball(
     views: Array,
     known: Known,
     drawn: tuple[Template, Template],
+    held: Array,
     fits: Array,
 ) -> Reason | None:
     """Find a ball near a prediction and fit its centre.
@@ -65,13 +67,14 @@ def find_ball(
         views: of `view.expected_views`, its row finite.
         known: of the camera.
         drawn: the templates of its brightness and of its colour.
+        held (balls, any, 3): see `Expected.held`.
         fits (balls, SIZE): its row is filled in.
     Returns:
         None; NO_BALL when nothing of its colour and size is there but noise, or the fit runs away; AT_BORDER when it is
         cut off.
     """
     luma, chroma = drawn
-    status = _find_and_fit(image, room.mean, room.looks, ball, *colour, views, *known, *luma, *chroma, fits)
+    status = _find_and_fit(image, room.mean, room.looks, ball, *colour, views, *known, *luma, *chroma, held, fits)
     return None if status == _FOUND else _REASONS[status]
 
 
@@ -152,13 +155,14 @@ def _nearest_spot(
     "i8(Array(u1, 3, 'C', True), Array(f4, 3, 'C'), Array(u1, 2, 'C'), i8,"
     "Array(i2, 2, 'C', True), Array(i2, 1, 'C', True), Array(b1, 2, 'C', True), i8, i8,"
     "f8[:, ::1], f8[::1], i8, f8[::1], f8[::1], Array(f4, 3, 'C', True), f8[::1], Array(f4, 3, 'C', True), f8[::1],"
-    "f8[:, ::1])"
+    "f8[:, :, ::1], f8[:, ::1])"
 )
 def _find_and_fit(
     image: Image, room: NDArray[np.float32], looks: NDArray[np.uint8], ball_index: int,
     least_spread: NDArray[np.int16], lowest_spread: NDArray[np.int16], hues: NDArray[np.bool_],
     blue: int, red: int, views: Array, answers: Array, block: int, light: Array, trust: Array,
-    luma: NDArray[np.float32], luma_made: Array, chroma: NDArray[np.float32], chroma_made: Array, fits: Array,
+    luma: NDArray[np.float32], luma_made: Array, chroma: NDArray[np.float32], chroma_made: Array, held: Array,
+    fits: Array,
 ) -> int:  # fmt: skip
     """Find the spot nearest the prediction, cut its pixels out and fit them; fill in a row of fits, say how it went."""
     height, width, view, fit = image.shape[0], image.shape[1], views[ball_index], fits[ball_index]
@@ -175,6 +179,8 @@ def _find_and_fit(
         return _CUT_OFF
     du, dv = spot_u - middle_u, spot_v - middle_v
     bright, colour = cut_pixels(image, room, looks, middle_u, middle_v, half, block, du, dv, edge_px, light, trust)
+    for pixels in (bright, colour):
+        distrust(pixels, held[ball_index], ball[BALL_RADIUS], ball[STREAK_U], ball[STREAK_V], du, dv)
     gauss_newton(bright, colour, luma, luma_made, chroma, chroma_made, ball, du, dv, found)
     if not (found[0] - du) ** 2 + (found[1] - dv) ** 2 <= MAX_SHIFT_PX**2:
         return _RAN_AWAY

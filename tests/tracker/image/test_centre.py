@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,8 @@ from tests.tracker.drawing import developed, draw_ball, draw_band, empty_canvas,
 from tests.tracker.paper_rig import paper_rig
 from tracker.image.appearance import Appearance
 from tracker.image.centre import Centre, fit_centre
-from tracker.image.patch import Expected, Response
+from tracker.image.holder import held_towards
+from tracker.image.patch import NOT_HELD, Expected, Response
 from tracker.image.template import FLAT
 from tracker.types import Array, Image, Reason
 
@@ -107,8 +109,8 @@ def test_a_ball_that_a_tube_holds_is_found_more_surely_with_the_tube_left_out() 
         u, v = rng.uniform((200, 200), (400, 300))
         image = on_a_tube(np.array((u, v)), RADIUS_PX, (2.0, rng))
         what = known.expected_like(expected(np.array((u, v))), CAMERA, np.array((u, v)))
-        for errors, held_px in ((drawn_px, None), (left_out_px, (u - 60.0, v))):
-            found = fit_centre(image, what, held_px)
+        for errors, held in ((drawn_px, NOT_HELD), (left_out_px, held_towards((u, v), (u - 60.0, v), RADIUS_PX))):
+            found = fit_centre(image, replace(what, held=held))
             assert isinstance(found, Centre)
             errors.append(float(found.uv_px[0]) - u)
     assert np.std(left_out_px) < 0.8 * np.std(drawn_px)

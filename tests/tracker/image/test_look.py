@@ -13,6 +13,7 @@ from tests.tracker.rigs import covariance, perturbed, seen_px, state
 from tracker.image.album import Album
 from tracker.image.appearance import Appearance
 from tracker.image.look import gaze_of, look_everywhere, look_near
+from tracker.image.mounting import Mounting
 from tracker.image.patch import Response
 from tracker.state import State
 from tracker.types import BallSighting, Frame, Reason, Rejected
@@ -24,7 +25,7 @@ SHARP = Appearance(Response(0.25, 0.25, detail=1.0))
 
 def look(image: Frame, expected: State) -> tuple[list[BallSighting], list[Rejected]]:
     gazes = [gaze_of(RIG, SHARP, Album(camera)) for camera in RIG.cameras]
-    found = look_near([image], RIG, expected, gazes)
+    found = look_near([image], RIG, expected, gazes, Mounting(RIG.marker).things)
     return found.sightings, found.rejections
 
 

@@ -16,6 +16,7 @@ from tools.calibrate.room.start import triangulated_from
 from tools.calibrate.room.tracks import Track, track_of
 from tracker.image.appearance import Appearance
 from tracker.image.centre import Centre, fit_centre
+from tracker.image.holder import held_towards
 from tracker.image.patch import Expected
 from tracker.image.rivals import Rivals, first_rivals, settled_on
 from tracker.rig import Rig
@@ -74,24 +75,22 @@ class Again:
         u_px, v_px, _ = seen.tolist()
         depth_m, *speed_px_s = self.views[k, ball].tolist()
         x, y, z = camera.bearings(seen[None, :2])[0].tolist()
+        radius_px = camera.focal_px * self.rig.marker.balls[ball].radius_m / depth_m
+        amid_u, amid_v, _ = self.clips[k].centres_px.mean(axis=0).tolist()  # where the tubes meet that hold the balls
         return Expected(
             (u_px, v_px),
-            camera.focal_px * self.rig.marker.balls[ball].radius_m / depth_m,
+            radius_px,
             (speed_px_s[0], speed_px_s[1]),
             known.shades(camera, x / z, y / z),
             known.response,
             ray=(x / z, y / z),
+            held=held_towards((u_px, v_px), (amid_u, amid_v), radius_px),
         )
 
     def image(self, k: int) -> Image:
         """Return an image."""
         camera = self.rig.cameras[self.camera]
         return self.clips[k].frame(camera.width_px, camera.height_px).image
-
-    def held_px(self, k: int) -> tuple[float, float]:
-        """Return where in an image the tubes meet that hold the balls: amid them."""
-        u, v, _ = self.clips[k].centres_px.mean(axis=0).tolist()
-        return u, v
 
 
 def again(footage: Footage, rig: Rig) -> tuple[Again, ...]:

@@ -46,11 +46,11 @@ def _measured(camera: Again) -> Iterator[tuple[float, Array]]:
 
 def _refitted(camera: Again, image: Image, rivals: Rivals, encoding: Encoding | None, k: int, ball: int) -> Array:
     """Return a ball's centre and one sigma (3,) [px]; that of the first look, believed less, where none fits."""
-    expected, held_px = camera.expected(rivals, k, ball), camera.held_px(k)
-    fit = fit_centre(image, expected, held_px)
+    expected = camera.expected(rivals, k, ball)
+    fit = fit_centre(image, expected)
     if not isinstance(fit, Centre):
         return np.asarray(camera.clips[k].centres_px[ball] * (1.0, 1.0, DOUBT))
     if encoding is not None:
         there = replace(expected, uv_px=(float(fit.uv_px[0]), float(fit.uv_px[1])))
-        fit = fitted(image, there, held_px, encoding, ball, NOTHING) or fit
+        fit = fitted(image, there, encoding, ball, NOTHING) or fit
     return np.append(fit.uv_px, sigma_px(fit))

@@ -11,7 +11,7 @@ from tools.calibrate.room.encoded import OWN, SHAPES, U, V, fit_encoded
 from tracker.image.appearance import MISFIT_MAX, Appearance
 from tracker.image.behind import NO_ROOM
 from tracker.image.centre import Centre, numbers_of
-from tracker.image.holder import without_holder
+from tracker.image.holder import without_holders
 from tracker.image.patch import CLIPPED, CLIPPED_TRUST, RING_PX, TRUST, Expected, Patch, extent_of, light_of
 from tracker.image.template import MARGIN_PX, template_for
 from tracker.image.whiten import SCALES, whitening
@@ -54,7 +54,7 @@ class Square:
     trust_colour: Array
 
 
-def square_of(image: Image, ball: Expected, held_px: tuple[float, float]) -> Square | None:
+def square_of(image: Image, ball: Expected) -> Square | None:
     """Return the pixels round a ball without what holds it; None where they leave the image."""
     extent = extent_of(ball)
     left, top = (extent.u - extent.half) & ~1, (extent.v - extent.half) & ~1
@@ -68,18 +68,15 @@ def square_of(image: Image, ball: Expected, held_px: tuple[float, float]) -> Squ
     pixels = np.array((x, y, near * np.where(full, CLIPPED_TRUST, 1.0)), dtype=np.float64)
     in_blocks = pixels.reshape(3, side, 2, side, 2)
     blocks = np.concatenate((in_blocks[:2].mean(axis=(2, 4)), in_blocks[2:].min(axis=(2, 4)))).reshape(3, -1)
-    seen = without_holder(Patch(pixels, blocks), extent, ball, held_px)
+    seen = without_holders(Patch(pixels, blocks), extent, ball)
     return Square(left, top, side, pixels[:2], seen.bright[TRUST], seen.colour[TRUST])
 
 
-def fitted(
-    image: Image, ball: Expected, held_px: tuple[float, float], known: Encoding, which: int, shared: Array
-) -> Centre | None:
+def fitted(image: Image, ball: Expected, known: Encoding, which: int, shared: Array) -> Centre | None:
     """Fit a ball as a camera encodes it.
 
     Args:
         ball: what is known of it, its centre within half a pixel.
-        held_px: where in the image the tube leads to that holds it.
         which: of the paints.
         shared: see `fit_encoded`.
     Returns:
@@ -89,7 +86,7 @@ def fitted(
     """
     if len(ball.shades.weights) != SHAPES:  # the compiled fit checks no index
         raise ValueError(f"a ball of {len(ball.shades.weights)} shapes: must be {SHAPES}; learn its light first")
-    square = square_of(image, ball, held_px)
+    square = square_of(image, ball)
     if square is None:
         return None
     extent, scale, covariance = extent_of(ball), np.zeros(SCALES), np.empty((2, 2))

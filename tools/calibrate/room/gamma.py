@@ -118,14 +118,14 @@ def _told_by_each(camera: Again, known: Encoding) -> Iterator[tuple[int, Array]]
     """Yield of each sighting which ball it is of, and its products of what is shared, see `fit_encoded`."""
     rivals = settled_on(known.appearance)
     for k in _sightings(camera):
-        image, held_px = camera.image(k), camera.held_px(k)
+        image = camera.image(k)
         for ball in range(len(known.paints)):
             expected, shared = camera.expected(rivals, k, ball), np.zeros((SHARED + 1, SHARED + 1))
-            found = fit_centre(image, expected, held_px)
+            found = fit_centre(image, expected)
             if not isinstance(found, Centre) or found.misfit > MISFIT_MAX:
                 continue
             there = replace(expected, uv_px=(float(found.uv_px[0]), float(found.uv_px[1])))
-            if fitted(image, there, held_px, known, ball, shared) is not None:
+            if fitted(image, there, known, ball, shared) is not None:
                 yield ball, np.tril(shared) + np.tril(shared, -1).T
 
 

@@ -70,7 +70,7 @@ def test_a_ball_kept_as_jpeg_is_found_to_a_thirtieth_of_a_pixel() -> None:
         levels, _ = levels_with(at)
         image = through_jpeg(np.rint(levels.T.reshape(SIZE_PX, SIZE_PX, 3)).astype(np.uint8), 95)
         known = Encoding(KNOWN, SMOOTHED, at[None, PAINT:])
-        found = fitted(image, EXPECTED, EXPECTED.uv_px, known, 0, NOTHING)
+        found = fitted(image, EXPECTED, known, 0, NOTHING)
         assert found is not None
         errors.append(found.uv_px - EXPECTED.uv_px - at[[U, V]])
     assert np.sqrt((np.array(errors) ** 2).mean()) < 1.0 / 30.0
