@@ -26,7 +26,7 @@ DIRECTIONS = 200  # of the body, evenly spread: 14 deg apart
 SECTORS = 24  # of an image round a ball
 MOST = 3  # things about one ball
 FORGETTING = 0.995  # a view
-ENOUGH = 40  # views until a direction is judged
+ENOUGH, SLOWLY = 30, 30  # views until a direction is judged, and more until it counts in full
 BUSY = 2.0  # times what a fit leaves on average: far more than chance gives in so many views
 FORESHORTENED = 0.5  # what looks shorter than this share of its length tells little of its direction
 END_ON = 0.35  # and shorter than this it is before the ball or behind it
@@ -152,7 +152,7 @@ def _pick(busy: Array, views: Array, things: Array) -> None:
                 for i in range(STRANGE):
                     things[m, i] += (busy[k] - 1.0) * SPHERE[k, i]
         things[m, :STRANGE] /= math.sqrt(_cosine(things[m], things[m]))
-        things[m, STRANGE] = (most - 1.0) * min(1.0, (views[best] - ENOUGH) / ENOUGH)
+        things[m, STRANGE] = (most - 1.0) * min(1.0, (views[best] - ENOUGH) / SLOWLY)
 
 
 @compiled("void(f8[::1], f8, f8, f8[:, ::1], f8[::1], f8[::1], f8[:, ::1])")

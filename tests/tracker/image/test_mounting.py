@@ -26,6 +26,7 @@ from tracker.types import Array
 RIG = paper_rig()
 CAMERA, BALL, RADIUS_PX = RIG.cameras[0], RIG.marker.balls[1], 5.0
 TUBE_BGR = np.array((40.0, 38.0, 36.0))
+VIEWS = 80
 ALONG_inB = np.array((0.8, 0.0, -0.6))
 SHARP = Response(0.2, 0.2, detail=1.0)
 
@@ -80,7 +81,7 @@ def after_views(views: int, draw: Draw) -> Mounting:
 
 
 def test_a_tube_that_holds_a_ball_is_found_in_the_body() -> None:
-    things = after_views(2 * ENOUGH, draw_tube).things
+    things = after_views(VIEWS, draw_tube).things
     assert things[1, 0, :3] @ ALONG_inB > math.cos(math.radians(20.0))
     assert things[1, 0, STRANGE] > 1.0
     assert not things[[0, 2]].any()
@@ -88,7 +89,7 @@ def test_a_tube_that_holds_a_ball_is_found_in_the_body() -> None:
 
 @pytest.mark.parametrize("draw", [draw_nothing, draw_shelves])
 def test_neither_a_bare_ball_nor_one_before_shelves_is_held_by_anything(draw: Draw) -> None:
-    assert not after_views(2 * ENOUGH, draw).things.any()
+    assert not after_views(VIEWS, draw).things.any()
 
 
 def test_few_views_tell_nothing() -> None:
