@@ -44,11 +44,12 @@ class Process:
 R_ZZ = 11  # of `State.mean`: the attitude's last element, how upright the body is
 STILL = frozen_array(np.zeros(3))
 FIRST_CLOCK = frozen_array(np.zeros(1))  # the offset of a single camera's
+_P, _R, _V, _W = slice(0, 3), slice(3, 12), slice(12, 15), slice(15, 18)
+_A, _ALPHA, _J, _BETA, _CLOCKS = slice(18, 21), slice(21, 24), slice(24, 27), slice(27, 30), slice(30, None)
 _PARTS = MappingProxyType(
     {
-        "p_BinW": slice(0, 3), "R_BtoW": slice(3, 12), "v_BinW": slice(12, 15), "w_BinB": slice(15, 18),
-        "a_BinW": slice(18, 21), "alpha_BinB": slice(21, 24), "j_BinW": slice(24, 27), "beta_BinB": slice(27, 30),
-        "offsets_s": slice(30, None),
+        "p_BinW": _P, "R_BtoW": _R, "v_BinW": _V, "w_BinB": _W, "a_BinW": _A, "alpha_BinB": _ALPHA, "j_BinW": _J,
+        "beta_BinB": _BETA, "offsets_s": _CLOCKS,
     }
 )  # fmt: skip
 """Where each part stands in `State.mean`, the attitude by rows."""
@@ -79,42 +80,42 @@ class State:
     @property
     def p_BinW(self) -> Array:
         """Return the body's place (3,) [m]."""
-        return self.mean[0:3]
+        return self.mean[_P]
 
     @property
     def R_BtoW(self) -> Array:
         """Return the attitude (3, 3)."""
-        return self.mean[3:12].reshape(3, 3)
+        return self.mean[_R].reshape(3, 3)
 
     @property
     def v_BinW(self) -> Array:
         """Return the velocity (3,) [m/s]."""
-        return self.mean[12:15]
+        return self.mean[_V]
 
     @property
     def w_BinB(self) -> Array:
         """Return the angular rate (3,) [rad/s]."""
-        return self.mean[15:18]
+        return self.mean[_W]
 
     @property
     def a_BinW(self) -> Array:
         """Return the acceleration (3,) [m/s^2]."""
-        return self.mean[18:21]
+        return self.mean[_A]
 
     @property
     def alpha_BinB(self) -> Array:
         """Return the angular acceleration (3,) [rad/s^2]."""
-        return self.mean[21:24]
+        return self.mean[_ALPHA]
 
     @property
     def j_BinW(self) -> Array:
         """Return the jerk (3,) [m/s^3]."""
-        return self.mean[24:27]
+        return self.mean[_J]
 
     @property
     def beta_BinB(self) -> Array:
         """Return the angular jerk (3,) [rad/s^3]."""
-        return self.mean[27:30]
+        return self.mean[_BETA]
 
     @property
     def offsets_s(self) -> Array:
@@ -122,7 +123,7 @@ class State:
 
         Camera 0's clock counts, so its offset is 0.
         """
-        return self.mean[30:]
+        return self.mean[_CLOCKS]
 
     def moved(self, dx: Array) -> State:
         """Return the state with the error dx (n,) put in; the covariance stays as it is."""
