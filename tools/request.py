@@ -66,7 +66,7 @@ class CpuClocks:
 
 @dataclass(frozen=True, slots=True)
 class RunRequest:
-    """One run. source: the URI as given.  log, summary: files to write, None for none."""
+    """One run. source: the URI as given.  log, summary: files to write, None for none.  config: the file gone by."""
 
     settings: Settings
     source: str
@@ -75,6 +75,7 @@ class RunRequest:
     summary: Path | None
     overwrite: bool
     quiet: bool
+    config: Path | None = None
 
 
 @dataclass(frozen=True, slots=True)

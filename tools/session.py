@@ -30,6 +30,7 @@ from bridge.telemetry.gauges import names_of
 from bridge.telemetry.post import open_post
 from bridge.telemetry.snapshot import About
 from bridge.telemetry.telemetry import Telemetry
+from tools.kept import keep
 from tools.open_source import OpenedSource, open_source
 from tools.request import Clocks, Pace, RunRequest
 from tools.steady import steady
@@ -37,6 +38,7 @@ from tools.summary_file import check_summary_path, write_summary
 from tracker.errors import OperatorError
 from tracker.pipeline import Tracker
 from tracker.rig import Rig
+from tracker.sources.uri import parse_source
 from tracker.start.paper import PaperTracker
 from tracker.types import Event
 
@@ -52,8 +54,7 @@ def run_session(request: RunRequest, clocks: Clocks) -> None:
         KeyboardInterrupt: the operator ended the run.
     """
     console = Console(stderr=True)
-    if request.summary is not None:
-        check_summary_path(request.summary)
+    _check_outputs(request)
     with ExitStack() as stack:
         opened = open_source(request.source, request.settings, clocks)
         stack.enter_context(opened.source)
@@ -82,6 +83,15 @@ def run_session(request: RunRequest, clocks: Clocks) -> None:
             stack.close()
             if not refused:
                 _report(outlets, request, console, opened.troubles())
+
+
+def _check_outputs(request: RunRequest) -> None:
+    """Find out before the flight what could not be written, or would destroy what the run goes by."""
+    inputs = parse_source(request.source).files + (() if request.config is None else (request.config,))
+    keep(inputs, request.log, "--log")
+    if request.summary is not None:
+        keep(inputs if request.log is None else (*inputs, request.log), request.summary, "--summary")
+        check_summary_path(request.summary)
 
 
 def _report(outlets: Outlets, request: RunRequest, console: Console, source_troubles: tuple[str, ...]) -> None:

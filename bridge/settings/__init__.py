@@ -1,7 +1,7 @@
 """The operator's choices: a TOML file, checked, as frozen values."""
 
 from bridge.settings.choose_rig import ChosenRig, RigOrigin, marker_of, rig_of
-from bridge.settings.load import load_settings, shipped_configs
+from bridge.settings.load import config_path, load_settings, shipped_configs
 from bridge.settings.models import LinkSettings, MonitorSettings, PlaceSettings, Settings, TrackerSettings
 
 __all__ = [
@@ -12,6 +12,7 @@ __all__ = [
     "RigOrigin",
     "Settings",
     "TrackerSettings",
+    "config_path",
     "load_settings",
     "marker_of",
     "rig_of",

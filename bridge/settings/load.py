@@ -25,7 +25,7 @@ def load_settings(name_or_path: str | Path) -> Settings:
     Raises:
         OperatorError: no such file, no TOML, an unknown key, a value outside its limit.
     """
-    path = shipped_configs().get(str(name_or_path), Path(name_or_path))
+    path = config_path(name_or_path)
     table = _read(path)
     _anchor(table, "rig", "calibration", path.resolve().parent)
     _anchor(table, "mavlink", "signing_key", path.resolve().parent)
@@ -33,6 +33,11 @@ def load_settings(name_or_path: str | Path) -> Settings:
         return Settings.model_validate(table)
     except ValidationError as error:
         raise OperatorError(f"config {path}: {complaint(error, table)}") from error
+
+
+def config_path(name_or_path: str | Path) -> Path:
+    """Return the file of a config: a shipped one's by its name, else the path itself."""
+    return shipped_configs().get(str(name_or_path), Path(name_or_path))
 
 
 def shipped_configs() -> dict[str, Path]:

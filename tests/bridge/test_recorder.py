@@ -117,6 +117,18 @@ def test_closing_twice_is_safe_and_what_comes_later_counts_as_dropped(tmp_path: 
     assert (log.state().written, log.state().dropped) == (1, 1)
 
 
+def test_a_log_that_is_being_written_is_not_replaced(tmp_path: Path) -> None:
+    flight = turns(2)
+    with recorder(tmp_path / "a.mcap") as log:
+        log.take(*flight[0])
+        with pytest.raises(OperatorError, match="another posebridge writes it just now; name another"):
+            recorder(tmp_path / "a.mcap", overwrite=True)
+        log.take(*flight[1])
+    assert estimate_times(tmp_path / "a.mcap") == taken_times(flight)
+    record(tmp_path / "a.mcap", flight[:1], overwrite=True)
+    assert estimate_times(tmp_path / "a.mcap") == taken_times(flight[:1])
+
+
 def test_a_log_of_nothing_is_whole(tmp_path: Path) -> None:
     record(tmp_path / "a.mcap", [])
     reader = LogReader(tmp_path / "a.mcap")

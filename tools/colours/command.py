@@ -9,7 +9,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from bridge.settings import Settings, load_settings, shipped_configs
+from bridge.settings import Settings, config_path, load_settings
 from bridge.settings.tuning import tuning_of
 from tools.colours.footage import Gathering, gather
 from tools.colours.picture import draw_palette
@@ -94,7 +94,7 @@ def _watch(request: ColoursRequest, settings: Settings, clocks: Clocks) -> tuple
 
 
 def _write(target: Path, config: str, palette: Palette) -> None:
-    path = shipped_configs().get(config, Path(config))
+    path = config_path(config)
     colours = {lesson.name: lesson.new for lesson in palette.balls}
     text = path.read_text(encoding="utf-8")
     write_config(target, recoloured(text, colours, path.resolve().parent, target.resolve().parent))

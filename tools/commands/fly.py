@@ -44,12 +44,12 @@ def run(
 ) -> None:
     """Track the vehicle and send its pose to the autopilot; Ctrl-C ends it."""
     tell_of_compiling()
-    from bridge.settings import load_settings
+    from bridge.settings import config_path, load_settings
 
     if log is None and (log_frames or log_frames_mb):
         raise OperatorError("--log-frames: there is no log to keep them in; add --log FILE.mcap")
     settings = load_settings(config).with_links(tuple(link or ())).with_frames(log_frames, log_frames_mb)
-    request = RunRequest(settings, source, log, pace, summary, overwrite, quiet)
+    request = RunRequest(settings, source, log, pace, summary, overwrite, quiet, config_path(config))
 
     from tools.session import run_session
 

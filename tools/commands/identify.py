@@ -9,6 +9,7 @@ import orjson
 import typer
 
 from tools.commands.common import ConfigOption, JsonOption
+from tools.kept import keep
 from tracker.errors import OperatorError
 
 MODELS = ("hover",)
@@ -38,8 +39,9 @@ def sysid(
         sheet = load_settings(config).vehicle
         if sheet is None:
             raise OperatorError(f"--config {config}: holds no [vehicle] sheet; add one (docs/sysid.md)")
-    report = identify_log(log, read_log(log, sheet))
     page = out or log.with_suffix(".sysid.html")
+    keep((log,), page, "--out")
+    report = identify_log(log, read_log(log, sheet))
     try:
         page.write_text(report.to_html(), encoding="utf-8")
     except OSError as error:
@@ -63,11 +65,12 @@ def excite(
     """Plan stick inputs that a model can be found from, inside the room's volume and the vehicle's limits."""
     if not SHORTEST_S <= sweep_s <= LONGEST_S:
         raise OperatorError(f"--sweep_s: {sweep_s:g} s must be {SHORTEST_S:g} to {LONGEST_S:g} s; give a length within")
-    from bridge.settings import load_settings
+    from bridge.settings import config_path, load_settings
     from tools.excite.picture import draw_plan
     from tools.excite.plan import make_plan
     from tools.excite.plan_file import write_plan
 
+    keep((config_path(config),), out, "--out")
     plan = make_plan(load_settings(config), sweep_s)
     write_plan(plan, out)
     picture = out.with_suffix(".png")

@@ -81,7 +81,7 @@ def replay(
 ) -> None:
     """Run the frames of a log through the tracker again; with its own settings it sends the same bytes."""
     tell_of_compiling()
-    from bridge.settings import load_settings
+    from bridge.settings import config_path, load_settings
     from tools.replay import grounded, met_autopilot, settings_of
     from tools.session import run_session
 
@@ -90,7 +90,8 @@ def replay(
         settings = settings.with_links(tuple(link))
     else:
         settings = grounded(settings, answered=pace is Pace.FAST and met_autopilot(log))
-    run_session(RunRequest(settings, f"log:{log}", out, pace, summary, overwrite, quiet), clocks_of(context))
+    own = None if config is None else config_path(config)
+    run_session(RunRequest(settings, f"log:{log}", out, pace, summary, overwrite, quiet, own), clocks_of(context))
 
 
 def compare(

@@ -15,6 +15,7 @@ from tools.compare.figures import Comparison, Difference, compare, nis_share
 from tools.compare.flown import Flown, path_of, read_flown
 from tools.compare.picture import draw_comparison
 from tools.export.outfile import whole_or_absent
+from tools.kept import keep
 from tracker.sources.groundtruth import read_ground_truth
 from tracker.types import Array
 
@@ -29,6 +30,7 @@ def run_compare(a: Path, b: Path, truth: Path | None, out: Path | None, as_json:
         OperatorError: a log or the truth that cannot be read, or no time in common.
     """
     reference = None if truth is None else path_of(read_ground_truth(truth))
+    keep((a, b), out, "--out")
     comparison = compare(read_flown(a), read_flown(b), reference)
     errors = Console(stderr=True, soft_wrap=True, highlight=False)
     for log, one in ((a, comparison.a), (b, comparison.b)):

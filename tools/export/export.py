@@ -15,6 +15,7 @@ from tools.export.outfile import whole_or_absent
 from tools.export.report import Report, report_of, to_json
 from tools.export.survey import survey
 from tools.export.tlog import Topics, links_of, write_tlog
+from tools.kept import keep
 from tracker.errors import OperatorError
 
 FORMATS = ("csv", "mat", "parquet", "tlog", "tum")
@@ -70,8 +71,7 @@ def export(log_path: Path, terms: ExportTerms, out_path: Path, on_offset: OnOffs
         OperatorError: no readable log, nothing in it, no writable output, or the output is the log itself.
     """
     reader = LogReader(log_path)
-    if out_path.exists() and out_path.samefile(log_path):
-        raise OperatorError(f"export {out_path}: is the log itself, which is kept; name another file")
+    keep((log_path,), out_path, "export")
     if terms.rate_hz is not None:
         return _export_grid(reader, terms, terms.rate_hz, out_path, on_offset)
     with whole_or_absent(out_path) as path:

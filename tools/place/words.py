@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 import tomlkit
 
-from bridge.settings import shipped_configs
+from bridge.settings import config_path
 from tools.place.layout import view_deg
 from tools.place.limits import Limits
 from tracker.camera import Camera
@@ -64,7 +63,7 @@ def config_with(config: str, cameras: Sequence[Camera], limits: Limits) -> str:
     Raises:
         OperatorError: the config has gone meanwhile.
     """
-    path = shipped_configs().get(config, Path(config))
+    path = config_path(config)
     try:
         document = tomlkit.parse(path.read_text(encoding="utf-8"))
     except OSError as error:

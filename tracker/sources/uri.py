@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import StrEnum
+from pathlib import Path
 
 from tracker.errors import OperatorError
 
@@ -40,6 +41,13 @@ class SourceUri:
         """Split the argument at commas, or at semicolons if it holds any (a GStreamer pipeline has commas)."""
         separator = ";" if ";" in self.argument else ","
         return tuple(item.strip() for item in self.argument.split(separator) if item.strip())
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Return the files that the frames come out of; a recording is a folder of many."""
+        if self.kind is SourceKind.LOG:
+            return (Path(self.argument),)
+        return tuple(map(Path, self.items)) if self.kind is SourceKind.VIDEO else ()
 
     def __str__(self) -> str:
         return f"{self.kind}:{self.argument}"

@@ -1,0 +1,73 @@
+"""No command writes over what it goes by."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from bridge.settings import shipped_configs
+from tests.bridge.recordings import record, turns
+from tools.cli import EXIT_OPERATOR, run_command_line
+from tools.kept import keep
+from tracker.errors import OperatorError
+
+KEPT = "this command goes by that file, which is kept; name another"
+
+
+@pytest.fixture
+def log(tmp_path: Path) -> Path:
+    record(tmp_path / "flight.mcap", turns(3))
+    return tmp_path / "flight.mcap"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        "run --source log:LOG --log LOG --overwrite",
+        "run --source video:LOG,LOG --log LOG --overwrite",
+        "replay LOG --config lab --log LOG --overwrite",
+        "replay LOG --config lab --summary LOG",
+        "compare LOG LOG --out LOG",
+        "export LOG --format tum --out LOG",
+        "sysid LOG --out LOG",
+    ],
+)
+def test_a_log_outlives_the_command_that_reads_it(
+    arguments: str, log: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    before = log.read_bytes()
+    assert run_command_line(arguments.replace("LOG", str(log)).split()) == EXIT_OPERATOR
+    assert KEPT in capsys.readouterr().err
+    assert log.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    "arguments", ["excite --config MY --out MY", "run --config MY --source sim:hover --summary MY"]
+)
+def test_a_config_outlives_the_command_that_goes_by_it(
+    arguments: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "my.toml"
+    shutil.copy(shipped_configs()["lab"], path)
+    before = path.read_bytes()
+    assert run_command_line(arguments.replace("MY", str(path)).split()) == EXIT_OPERATOR
+    assert KEPT in capsys.readouterr().err
+    assert path.read_bytes() == before
+
+
+def test_a_summary_does_not_take_the_place_of_its_log(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    both = str(tmp_path / "flight.mcap")
+    assert run_command_line(["run", "--source", "sim:hover", "--log", both, "--summary", both]) == EXIT_OPERATOR
+    assert "--summary" in capsys.readouterr().err
+
+
+def test_another_way_to_the_same_file_is_seen_and_a_device_is_none(tmp_path: Path) -> None:
+    (tmp_path / "link").symlink_to(tmp_path / "there.toml")
+    with pytest.raises(OperatorError, match=KEPT):
+        keep((tmp_path / "there.toml",), tmp_path / "link", "--out")
+    (tmp_path / "there.toml").touch()
+    with pytest.raises(OperatorError, match=KEPT):
+        keep((tmp_path / "there.toml",), tmp_path / "link", "--out")
+    keep((Path("/dev/null"),), Path("/dev/null"), "--out")

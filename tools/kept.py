@@ -1,0 +1,28 @@
+"""What a command reads is not what it writes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tracker.errors import OperatorError
+
+
+def keep(inputs: tuple[Path, ...], out: Path | None, what: str) -> None:
+    """Refuse to write over a file that the same command reads, whatever else may be replaced; devices hold nothing.
+
+    Args:
+        inputs: the files it reads, there or not.
+        out: the file it is to write, None for none.
+        what: the option that names it.
+    Raises:
+        OperatorError: the output is one of the inputs, by whatever path.
+    """
+    for each in inputs:
+        if out is not None and _are_one(each, out):
+            raise OperatorError(f"{what} {out}: this command goes by that file, which is kept; name another")
+
+
+def _are_one(one: Path, other: Path) -> bool:
+    if one.exists() and other.exists():
+        return one.is_file() and one.samefile(other)
+    return one.resolve() == other.resolve()
