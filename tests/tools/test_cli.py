@@ -7,12 +7,17 @@ import shlex
 import signal
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
+from rich.text import Text
+from typer.main import get_command
 
 from bridge.settings import shipped_configs
 from tests.bridge.recordings import record, turns
+from tools.cli import app
 
 ROOT = Path(__file__).parents[2]
 LAB = shipped_configs()["lab"].read_text(encoding="utf-8")
@@ -57,6 +62,25 @@ def test_wrong_usage_is_one_line_that_points_to_the_help(arguments: list[str], c
     line = refusal(*arguments)
     assert complaint in line
     assert line.endswith("; see `posebridge --help`")
+
+
+def described(command: Any) -> Iterator[Any]:
+    """Yield a command and its options, and those of the commands under it."""
+    yield command
+    yield from command.params
+    for each in getattr(command, "commands", {}).values():
+        yield from described(each)
+
+
+def test_no_help_is_taken_for_markup_and_swallowed() -> None:
+    texts = [each.help for each in described(get_command(app)) if each.help]
+    assert len(texts) > 100
+    assert [Text.from_markup(text).plain for text in texts] == texts
+
+
+def test_an_option_without_a_value_shows_none_in_its_help() -> None:
+    flags = [each for each in described(get_command(app)) if getattr(each, "is_flag", False)]
+    assert {each.metavar for each in flags} == {""}
 
 
 @pytest.mark.parametrize("duration_s", ["0", "-3", "nan", "inf", "1e9"])

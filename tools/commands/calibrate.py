@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tools.commands.common import ConfigOption, JsonOption, SourceOption, clocks_of, tell_of_compiling
+from tools.commands.common import ConfigOption, JsonOption, SourceOption, clocks_of, flag, tell_of_compiling
 
 EXIT_CALIBRATION_NOT_GOOD = 1
 
@@ -16,7 +16,7 @@ calibrate = typer.Typer(help="Calibrate cameras: print a board, find lenses, fin
 KindOption = Annotated[str, typer.Option("--board", help="charuco or chessboard.", metavar="KIND")]
 CornersOption = Annotated[str, typer.Option(help="Inner corners of the board, as OpenCV counts them.", metavar="CxR")]
 DictionaryOption = Annotated[str, typer.Option(help="The markers' dictionary, by OpenCV's name.", metavar="NAME")]
-OverwriteOption = Annotated[bool, typer.Option("--overwrite", help="Replace files that exist.")]
+OverwriteOption = Annotated[bool, flag("--overwrite", "Replace files that exist.")]
 MarkerOption = Annotated[
     float | None, typer.Option("--marker_mm", "--marker-mm", help="A marker's side; 0.75 squares if left out.")
 ]
@@ -80,7 +80,7 @@ def intrinsics(
         float, typer.Option("--distance_m", "--distance-m", help="From a camera to where is flown.")
     ] = 3.2,
     out: Annotated[
-        Path | None, typer.Option(help="Write the cameras here, as [[rig.cameras]].", metavar="FILE")
+        Path | None, typer.Option(help="Write the cameras here, as a config lists them.", metavar="FILE")
     ] = None,
     to: Annotated[str | None, typer.Option(help="Another format for it, as for convert.", metavar="FORMAT")] = None,
     picture: Annotated[Path | None, typer.Option(help="Draw coverage and errors here.", metavar="FILE.png")] = None,
@@ -139,7 +139,7 @@ def room(
         ),
     ] = "0,0,0",
     refine_intrinsics: Annotated[
-        bool, typer.Option("--refine-intrinsics", help="Adjust focal lengths and centres as well.")
+        bool, flag("--refine-intrinsics", "Adjust focal lengths and centres as well.")
     ] = False,
     by: Annotated[str, typer.Option(help="Who measured, for the room file.", metavar="NAME")] = "",
     seconds: Annotated[float, typer.Option(help="Of footage to read at most.")] = 180.0,

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from tools.request import Clocks, CpuClocks
 
+
+def flag(name: str, help: str) -> Any:
+    """Describe an option that takes no value: its help names no type."""
+    return typer.Option(name, help=help, metavar="")
+
+
 ConfigOption = Annotated[str, typer.Option(help="A shipped config by name, or a path to a .toml.")]
-JsonOption = Annotated[bool, typer.Option("--json", help="Print the figures as JSON.")]
+JsonOption = Annotated[bool, flag("--json", "Print the figures as JSON.")]
 SourceOption = Annotated[
     str, typer.Option(help="recording:DIR, video:A.mp4,B.mp4, camera:0,1, sim:NAME or log:FILE.mcap.", metavar="URI")
 ]

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tools.commands.common import ConfigOption, SourceOption, clocks_of, tell_of_compiling
+from tools.commands.common import ConfigOption, SourceOption, clocks_of, flag, tell_of_compiling
 from tools.request import DemoRequest, FrameFormat, Pace, RunRequest
 from tracker.errors import OperatorError
 
@@ -33,14 +33,14 @@ def run(
         typer.Option(help="Keep the frames in the log: png loses nothing, jpeg is small. Replaces the config's."),
     ] = None,
     log_frames_mb: Annotated[
-        float | None, typer.Option(help="Room for them [MB]; then the flight goes on without.", min=1.0, metavar="MB")
+        float | None, typer.Option(help="Room for them, in MB; then the flight goes on without.", min=1.0, metavar="MB")
     ] = None,
     pace: Annotated[
         Pace, typer.Option(help="real: as recorded. fast: as fast as it goes, same input, same bytes. Live is real.")
     ] = Pace.REAL,
     summary: Annotated[Path | None, typer.Option(help="Write the run's figures here.", metavar="FILE.json")] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a log that exists.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Show no status line and no summary.")] = False,
+    overwrite: Annotated[bool, flag("--overwrite", "Replace a log that exists.")] = False,
+    quiet: Annotated[bool, flag("--quiet", "Show no status line and no summary.")] = False,
 ) -> None:
     """Track the vehicle and send its pose to the autopilot; Ctrl-C ends it."""
     tell_of_compiling()
@@ -59,7 +59,7 @@ def run(
 def demo(
     context: typer.Context,
     duration_s: Annotated[
-        float, typer.Option("--duration_s", "--duration-s", help="Length of the flight [s].", metavar="S")
+        float, typer.Option("--duration_s", "--duration-s", help="Length of the flight, in s.", metavar="S")
     ] = 60.0,
     seed: Annotated[int, typer.Option(help="Same seed, same flight, same noise.", metavar="N")] = 1,
     out: Annotated[Path, typer.Option(help="Folder for the log and the summary.", metavar="DIR")] = Path("logs/demo"),
@@ -103,9 +103,9 @@ def sitl(
     ] = None,
     frame: Annotated[str, typer.Option(help="The vehicle: heli.")] = "heli",
     config: ConfigOption = "lab",
-    faults: Annotated[bool, typer.Option("--faults", help="Rehearse what may go wrong, in the air.")] = False,
+    faults: Annotated[bool, flag("--faults", "Rehearse what may go wrong, in the air.")] = False,
     mistakes: Annotated[
-        bool, typer.Option("--mistakes", help="Instead: true poses sent wrongly in every way known, a flight each.")
+        bool, flag("--mistakes", "Instead: true poses sent wrongly in every way known, a flight each.")
     ] = False,
     out: Annotated[Path, typer.Option(help="Folder for log and report.", metavar="DIR")] = Path("logs/sitl"),
 ) -> None:

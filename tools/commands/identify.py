@@ -59,7 +59,7 @@ def excite(
         Path, typer.Option(help="The plan; a picture and the sticks as CSV go beside it.", metavar="FILE.toml")
     ] = Path("excite.toml"),
     sweep_s: Annotated[
-        float, typer.Option("--sweep_s", "--sweep-s", help="Length of the cyclic sweeps [s].", metavar="S")
+        float, typer.Option("--sweep_s", "--sweep-s", help="Length of the cyclic sweeps, in s.", metavar="S")
     ] = 10.0,
 ) -> None:
     """Plan stick inputs that a model can be found from, inside the room's volume and the vehicle's limits."""

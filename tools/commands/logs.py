@@ -7,19 +7,17 @@ from typing import Annotated
 
 import typer
 
-from tools.commands.common import JsonOption, clocks_of, tell_of_compiling
+from tools.commands.common import JsonOption, clocks_of, flag, tell_of_compiling
 from tools.request import ExportFormat, Pace, RunRequest
 
 
 def monitor(
     context: typer.Context,
-    log: Annotated[
-        Path | None, typer.Argument(help="A log, in place of the bridge that runs.", metavar="[LOG]")
-    ] = None,
+    log: Annotated[Path | None, typer.Argument(help="A log, in place of the bridge that runs.", metavar="LOG")] = None,
     port: Annotated[
-        int | None, typer.Option(help="The bridge's [monitor] port, where several run or it is not the usual one.")
+        int | None, typer.Option(help="The bridge's port, where several run or it is not the usual one.")
     ] = None,
-    once: Annotated[bool, typer.Option("--once", help="Show one page and exit.")] = False,
+    once: Annotated[bool, flag("--once", "Show one page and exit.")] = False,
     json: JsonOption = False,
 ) -> None:
     """Watch a bridge that runs on this computer, or look through a log: rates, gaps, latency, NIS, links, alarms."""
@@ -76,8 +74,8 @@ def replay(
     out: Annotated[Path | None, typer.Option("--log", help="Record the replay in this file.", metavar="FILE")] = None,
     pace: Annotated[Pace, typer.Option(help="fast: same log, same bytes. real: as it was flown.")] = Pace.FAST,
     summary: Annotated[Path | None, typer.Option(help="Write the replay's figures here.", metavar="FILE.json")] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a log that exists.")] = False,
-    quiet: Annotated[bool, typer.Option("--quiet", help="Show no status line and no summary.")] = False,
+    overwrite: Annotated[bool, flag("--overwrite", "Replace a log that exists.")] = False,
+    quiet: Annotated[bool, flag("--quiet", "Show no status line and no summary.")] = False,
 ) -> None:
     """Run the frames of a log through the tracker again; with its own settings it sends the same bytes."""
     tell_of_compiling()

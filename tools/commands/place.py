@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tools.commands.common import ConfigOption, JsonOption, tell_of_compiling
+from tools.commands.common import ConfigOption, JsonOption, flag, tell_of_compiling
 
 EXIT_PLACE_NOT_GOOD = 1
 
@@ -27,8 +27,8 @@ def place(
     ] = None,
     out: Annotated[Path | None, typer.Option(help="Write pictures, cameras and a config here.", metavar="DIR")] = None,
     seed: Annotated[int, typer.Option(help="Same seed, same places.", metavar="N")] = 1,
-    fly: Annotated[bool, typer.Option("--fly", help="Check the forecast by a simulated flight.")] = False,
-    paper: Annotated[bool, typer.Option("--paper", help="The paper's figures and tables, redrawn.")] = False,
+    fly: Annotated[bool, flag("--fly", "Check the forecast by a simulated flight.")] = False,
+    paper: Annotated[bool, flag("--paper", "The paper's figures and tables, redrawn.")] = False,
     json: JsonOption = False,
 ) -> None:
     """Say where to put the cameras, or how good their places are, by the errors to be expected over the volume.

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tools.commands.common import ConfigOption, JsonOption, SourceOption, clocks_of, tell_of_compiling
+from tools.commands.common import ConfigOption, JsonOption, SourceOption, clocks_of, flag, tell_of_compiling
 
 EXIT_COLOURS_NOT_GOOD = 1
 EXIT_CHECK_NOT_GOOD = 1
@@ -24,7 +24,7 @@ def colours(
     write: Annotated[
         Path | None, typer.Option(help="Write a copy of the config with the learned colours.", metavar="FILE.toml")
     ] = None,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a config that exists.")] = False,
+    overwrite: Annotated[bool, flag("--overwrite", "Replace a config that exists.")] = False,
     json: JsonOption = False,
 ) -> None:
     """Learn the balls' colours from footage and warn of things in the room that look like them.
@@ -57,12 +57,12 @@ def check(
         str | None, typer.Option(help="The autopilot's link, as for run. Replaces the config's.", metavar="URI")
     ] = None,
     duration_s: Annotated[
-        float, typer.Option("--duration_s", "--duration-s", help="How long poses are watched [s].", metavar="S")
+        float, typer.Option("--duration_s", "--duration-s", help="How long poses are watched, in s.", metavar="S")
     ] = 10.0,
-    frame: Annotated[bool, typer.Option("--frame", help="Lead through the frame check: four moves by hand.")] = False,
-    wiggle: Annotated[bool, typer.Option("--wiggle", help="Find the delay while you wiggle the vehicle.")] = False,
-    apply: Annotated[bool, typer.Option("--apply", help="Write the wrong parameters, after asking.")] = False,
-    yes: Annotated[bool, typer.Option("--yes", help="Do not ask before writing.")] = False,
+    frame: Annotated[bool, flag("--frame", "Lead through the frame check: four moves by hand.")] = False,
+    wiggle: Annotated[bool, flag("--wiggle", "Find the delay while you wiggle the vehicle.")] = False,
+    apply: Annotated[bool, flag("--apply", "Write the wrong parameters, after asking.")] = False,
+    yes: Annotated[bool, flag("--yes", "Do not ask before writing.")] = False,
     json: JsonOption = False,
 ) -> None:
     """Prove before take-off that the autopilot uses the poses: one page, a verdict a line, with its fix.
