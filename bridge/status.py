@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType, TracebackType
 from typing import Self
@@ -16,6 +16,7 @@ from bridge.summary import ClockOffset
 
 REDRAW_NS = 200_000_000
 PLAIN_LINE_NS = 5_000_000_000
+BETWEEN = " | "
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +50,8 @@ class Reading:
 class StatusLine:
     """Show readings no more often than they can be read.
 
-    console: where to; a terminal gets one live line, anything else a plain line every 5 s of stream time.
+    console: where to; a terminal gets a live line, broken where it does not fit, anything else a plain one every 5 s of
+        stream time.
     stopwatch: reads a monotonic clock [ns]; paces the redrawing on a terminal.
     """
 
@@ -79,9 +81,9 @@ class StatusLine:
         """
         if self._live is not None:
             if self._is_due(self._stopwatch(), REDRAW_NS):
-                self._live.update(_line(read()), refresh=True)
+                self._live.update(Text(_laid_out(_parts(read()), self._console.width)), refresh=True)
         elif self._is_due(t_ns, PLAIN_LINE_NS):
-            self._console.print(_line(read()), soft_wrap=True)
+            self._console.print(Text(BETWEEN.join(_parts(read()))), soft_wrap=True)
 
     def _is_due(self, now_ns: int, every_ns: int) -> bool:
         """Say whether a period has passed since the last line; the first period starts at the first call."""
@@ -93,24 +95,31 @@ class StatusLine:
         return True
 
 
-def _line(reading: Reading) -> Text:
+def _parts(reading: Reading) -> list[str]:
+    """Return what the line says, part by part, an alarm first."""
     position = "-" if reading.position_m is None else " ".join(f"{metres:+.3f}" for metres in reading.position_m)
-    clocks = "".join(f"clock {name} {offset} | " for name, offset in reading.clocks.items())
-    far_ends = "".join(f" {far_end}" for far_end in reading.far_ends)
-    return Text(
-        f"{_alarm(reading)}{reading.state:<9} {reading.rate_hz:5.1f} Hz | latency p50 "
-        f"{_figure(reading.latency_p50_ms)} p99 {_figure(reading.latency_p99_ms)} ms | "
-        f"x y z {position} m | NIS {_figure(reading.nis)} | "
-        f"{clocks}links {reading.links_up}/{reading.links}{far_ends} | log {reading.log}",
-        overflow="ellipsis",
-        no_wrap=True,
-    )
-
-
-def _alarm(reading: Reading) -> str:
-    """Put the alarm first: on a narrow terminal the line's end is cut."""
     more = f" (and {reading.alarms - 1} more)" if reading.alarms > 1 else ""
-    return f"{reading.alarm}{more} | " if reading.alarm else ""
+    return [
+        *([f"{reading.alarm}{more}"] if reading.alarm else ()),
+        f"{reading.state:<9} {reading.rate_hz:5.1f} Hz",
+        f"latency p50 {_figure(reading.latency_p50_ms)} p99 {_figure(reading.latency_p99_ms)} ms",
+        f"x y z {position} m",
+        f"NIS {_figure(reading.nis)}",
+        *(f"clock {name} {offset}" for name, offset in reading.clocks.items()),
+        " ".join((f"links {reading.links_up}/{reading.links}", *reading.far_ends)),
+        f"log {reading.log}",
+    ]
+
+
+def _laid_out(parts: Sequence[str], width: int) -> str:
+    """Join parts to lines that fit; a part longer than a line is left for the terminal to wrap."""
+    lines: list[str] = []
+    for part in parts:
+        if lines and len(lines[-1]) + len(BETWEEN) + len(part) <= width:
+            lines[-1] += BETWEEN + part
+        else:
+            lines.append(part)
+    return "\n".join(lines)
 
 
 def _figure(value: float | None) -> str:

@@ -19,12 +19,12 @@ BLIND = Reading("searching", 0.0, None, None, None, None, 0, 1, "off")
 class Screen:
     """A console with its text, and a stopwatch set by hand."""
 
-    def __init__(self, terminal: bool) -> None:
+    def __init__(self, terminal: bool, width: int = 200) -> None:
         self.now_ns = 0
         self.reads = 0
         self._out = io.StringIO()
         self.line = StatusLine(
-            Console(file=self._out, width=200, force_terminal=terminal, color_system=None), lambda: self.now_ns
+            Console(file=self._out, width=width, force_terminal=terminal, color_system=None), lambda: self.now_ns
         )
 
     @property
@@ -57,6 +57,17 @@ def test_on_a_terminal_the_line_is_redrawn_five_times_a_second_however_fast_the_
             line.show(millisecond * FRAME_NS, screen.read)
     assert screen.reads == 4
     assert "tracking" in screen.text
+
+
+def test_on_a_narrow_terminal_the_line_is_broken_and_nothing_is_cut() -> None:
+    screen = Screen(terminal=True, width=60)
+    alarmed = replace(FLYING, alarm="a gap of 439 ms between poses; ArduPilot gives vision up after 300 ms", alarms=2)
+    with screen.line as line:
+        for screen.now_ns in (0, 1_000_000_000):
+            line.show(0, lambda: alarmed)
+    shown = screen.text.replace("\n", " ")
+    for part in ("after 300 ms (and 1 more)", "tracking   15.0 Hz", "NIS 1.2", "links 1/2", "log ok"):
+        assert part in shown
 
 
 @pytest.mark.parametrize("terminal", [False, True])
