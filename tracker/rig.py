@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
@@ -11,6 +12,8 @@ from tracker.errors import OperatorError
 from tracker.types import Array, frozen_array
 
 COLLINEAR_LIMIT_M = 0.005
+LEAST_RADIUS_M = 0.001
+LARGEST_ROOM_M = 200.0
 MIN_CAMERAS, MAX_CAMERAS = 2, 8
 
 
@@ -63,7 +66,7 @@ def make_marker(balls: tuple[Ball, ...]) -> Marker:
     """Check the balls and make a marker of them.
 
     Raises:
-        OperatorError: fewer than three balls, a name twice, a radius that is not positive, balls in a line.
+        OperatorError: fewer than three balls, a name twice, a radius of no ball, balls in each other, balls in a line.
     """
     names = [ball.name for ball in balls]
     if len(balls) < 3:
@@ -71,8 +74,12 @@ def make_marker(balls: tuple[Ball, ...]) -> Marker:
     if len(set(names)) != len(names):
         raise OperatorError(f"marker: ball names {', '.join(names)} must differ; rename one")
     for ball in balls:
-        if not ball.radius_m > 0:
-            raise OperatorError(f"marker: ball {ball.name} has radius {ball.radius_m * 1e3:g} mm; it must be positive")
+        if not ball.radius_m >= LEAST_RADIUS_M:
+            raise OperatorError(
+                f"marker: ball {ball.name} has radius {ball.radius_m * 1e3:g} mm, at least {LEAST_RADIUS_M * 1e3:g} mm "
+                "can be seen; radius_mm is in millimetres: correct it"
+            )
+    _refuse_overlaps(balls)
     points = frozen_array([ball.p_inB for ball in balls])
     width = float(np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[1])
     if width < COLLINEAR_LIMIT_M:
@@ -83,14 +90,33 @@ def make_marker(balls: tuple[Ball, ...]) -> Marker:
     return Marker(balls, points)
 
 
+def _refuse_overlaps(balls: tuple[Ball, ...]) -> None:
+    """Refuse balls that stand in each other, as they do when metres are given for millimetres."""
+    for one, other in combinations(balls, 2):
+        apart_m = float(np.linalg.norm(np.subtract(one.p_inB, other.p_inB)))
+        if apart_m < one.radius_m + other.radius_m:
+            raise OperatorError(
+                f"marker: the centres of {one.name} and {other.name} are {apart_m * 1e3:.3g} mm apart, their radii "
+                f"need {(one.radius_m + other.radius_m) * 1e3:.3g} mm; position_mm and radius_mm are in millimetres: "
+                "correct them"
+            )
+
+
 def make_rig(cameras: tuple[Camera, ...], marker: Marker) -> Rig:
     """Put cameras and marker together.
 
     Raises:
-        OperatorError: fewer than two or more than eight cameras.
+        OperatorError: fewer than two or more than eight cameras, or cameras that stand in no one room.
     """
     if not MIN_CAMERAS <= len(cameras) <= MAX_CAMERAS:
         raise OperatorError(
             f"rig: {len(cameras)} cameras; {MIN_CAMERAS} to {MAX_CAMERAS} work; name them in [[rig.cameras]]"
         )
+    for one, other in combinations(cameras, 2):
+        apart_m = float(np.linalg.norm(one.p_CinW - other.p_CinW))
+        if apart_m > LARGEST_ROOM_M:
+            raise OperatorError(
+                f"rig: {one.name} and {other.name} stand {apart_m:.4g} m apart, limit {LARGEST_ROOM_M:g} m; "
+                "T_CtoW and T_BS are in metres: correct them"
+            )
     return Rig(cameras, marker)

@@ -118,6 +118,12 @@ def test_frames_without_a_log_to_keep_them_in_are_refused() -> None:
     )
 
 
+def test_room_for_frames_that_nobody_keeps_is_refused(tmp_path: Path) -> None:
+    assert refusal("run", "--log", tmp_path / "flight.mcap", "--log-frames-mb", "30") == (
+        "--log-frames-mb 30: no frames are kept; add --log-frames jpeg or png"
+    )
+
+
 def test_a_log_without_frames_cannot_be_replayed(tmp_path: Path) -> None:
     record(tmp_path / "flight.mcap", turns(2))
     assert "holds no config; name one with --config" in refusal("replay", tmp_path / "flight.mcap")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -34,7 +36,12 @@ def test_a_marker_holds_the_balls_centres_in_order() -> None:
         ((ball("a", 0.0, 0.0), ball("b", 0.1, 0.0), ball("c", 0.0, 0.1, np.nan)), "ball c has radius nan mm"),
         ((ball("a", 0.0, 0.0), ball("b", 0.1, 0.0), ball("c", 0.2, 0.0)), "in a line within 0 mm, limit 5 mm"),
         ((ball("a", 0.0, 0.0), ball("b", 0.1, 0.003), ball("c", 0.2, 0.0)), "in a line within 2.4 mm, limit 5 mm"),
-        ((ball("a", 0.1, 0.0), ball("b", 0.1, 0.0), ball("c", 0.1, 0.0)), "in a line"),
+        (
+            (ball("a", 0.1, 0.0), ball("b", 0.1, 0.0), ball("c", 0.1, 0.0)),
+            "are 0 mm apart, their radii need 20 mm",
+        ),
+        ((ball("a", 0.0, 0.0), ball("b", 1e-4, 0.0), ball("c", 0.0, 1e-4)), "0.1 mm apart"),
+        ((ball("a", 0.0, 0.0), ball("b", 0.1, 0.0), ball("c", 0.0, 0.1, 1e-5)), "radius 0.01 mm, at least 1 mm"),
     ],
 )
 def test_a_marker_whose_attitude_cannot_be_seen_is_refused(balls: tuple[Ball, ...], complaint: str) -> None:
@@ -52,3 +59,10 @@ def test_a_rig_has_two_to_eight_cameras(count: int, good: bool) -> None:
     else:
         with pytest.raises(OperatorError, match=f"{count} cameras; 2 to 8 work"):
             make_rig(cameras, paper_rig().marker)
+
+
+def test_cameras_placed_in_millimetres_are_refused() -> None:
+    near, far = (paper_camera(f"cam{i}", 180.0 * i, (0.0,) * 4) for i in range(2))
+    far = replace(far, p_CinW=frozen_array(1e3 * far.p_CinW))
+    with pytest.raises(OperatorError, match=r"cam0 and cam1 stand \d+ m apart, limit 200 m; .* are in metres"):
+        make_rig((near, far), paper_rig().marker)

@@ -49,6 +49,8 @@ def run(
     if log is None and (log_frames or log_frames_mb):
         raise OperatorError("--log-frames: there is no log to keep them in; add --log FILE.mcap")
     settings = load_settings(config).with_links(tuple(link or ())).with_frames(log_frames, log_frames_mb)
+    if log_frames_mb and settings.log.frames == "off":
+        raise OperatorError(f"--log-frames-mb {log_frames_mb:g}: no frames are kept; add --log-frames jpeg or png")
     request = RunRequest(settings, source, log, pace, summary, overwrite, quiet, config_path(config))
 
     from tools.session import run_session
