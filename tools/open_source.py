@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,6 +12,7 @@ from bridge.log.footage import LogSource
 from bridge.settings import ChosenRig, Settings, rig_of
 from bridge.settings.models import CameraSettings
 from tools.request import Clocks
+from tracker.sources.devices import BY_PLUG, is_numbered, plugged_cameras
 from tracker.sources.live import LiveSource
 from tracker.sources.live_camera import LiveCamera
 from tracker.sources.paths import scripted_path
@@ -62,7 +63,7 @@ def _open_video(uri: SourceUri, settings: Settings, clocks: Clocks) -> OpenedSou
     chosen = rig_of(settings, None, len(uri.items))
     paths = tuple(Path(item) for item in uri.items)
     return OpenedSource(
-        VideoSource(paths, clocks.stopwatch, expected=chosen.rig.cameras), chosen, False, _doubts(chosen)
+        VideoSource(paths, clocks.stopwatch, expected=chosen.rig.cameras), chosen, False, doubts_of(chosen)
     )
 
 
@@ -75,7 +76,7 @@ def _open_cameras(uri: SourceUri, settings: Settings, clocks: Clocks) -> OpenedS
         for address, camera in zip(addresses, chosen.rig.cameras, strict=True)
     )
     source = LiveSource(cameras, clocks.monotonic, clocks.stopwatch)
-    return OpenedSource(source, chosen, live=True, warnings=(*source.warnings, *_doubts(chosen)))
+    return OpenedSource(source, chosen, live=True, warnings=(*source.warnings, *doubts_of(chosen, addresses)))
 
 
 def _open_simulation(uri: SourceUri, settings: Settings, clocks: Clocks) -> OpenedSource:
@@ -97,11 +98,20 @@ def _open_log(uri: SourceUri, settings: Settings, clocks: Clocks) -> OpenedSourc
     )
 
 
-def _doubts(chosen: ChosenRig) -> tuple[str, ...]:
-    """Warn of real cameras seen by a drawing."""
-    if not chosen.nominal:
+def doubts_of(chosen: ChosenRig, addresses: Sequence[str] = ()) -> tuple[str, ...]:
+    """Warn of real cameras seen by a drawing, and of calibrated ones that may change places.
+
+    Two that face each other, exchanged, fit as well as before: only the room is turned.
+    """
+    if chosen.nominal:
+        return ("the cameras are not calibrated: the config's nominal ones do for a look, not for flight",)
+    numbered = [address for address in addresses if is_numbered(address)]
+    if not numbered:
         return ()
-    return ("the cameras are not calibrated: the config's nominal ones do for a look, not for flight",)
+    named = plugged_cameras()
+    devices = [f"/dev/video{address}" if address.isdecimal() else address for address in numbered]
+    names = ",".join(named.get(device, device) for device in devices) if named else f"{BY_PLUG}/..."
+    return (f"cameras by number change places when plugged anew (docs/rig.md): name them by their plugs, {names}",)
 
 
 def live_camera(address: str, name: str, size_px: tuple[int, int], settings: CameraSettings | None) -> LiveCamera:

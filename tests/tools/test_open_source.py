@@ -8,8 +8,9 @@ import cv2
 import numpy as np
 import pytest
 
-from bridge.settings import RigOrigin, load_settings
-from tools.open_source import open_source
+from bridge.settings import ChosenRig, RigOrigin, load_settings
+from tests.tracker.paper_rig import paper_rig
+from tools.open_source import doubts_of, open_source
 from tools.request import Clocks
 from tracker.errors import OperatorError
 from tracker.types import Frame
@@ -70,3 +71,10 @@ def test_a_source_that_cannot_be_had_is_refused_in_one_line(uri: str, complaint:
         open_source(uri, load_settings("lab"), CLOCKS)
     assert complaint in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_calibrated_cameras_by_number_are_doubted_and_those_by_plug_or_network_are_not() -> None:
+    measured = ChosenRig(paper_rig(), RigOrigin.MEASURED)
+    assert "change places when plugged anew" in doubts_of(measured, ("0", "2"))[0]
+    assert doubts_of(measured, ("/dev/v4l/by-path/a-video-index0", "http://cam1/")) == ()
+    assert "not calibrated" in doubts_of(ChosenRig(paper_rig(), RigOrigin.NOMINAL), ("0", "2"))[0]

@@ -12,6 +12,7 @@ import cv2
 from cv2.typing import MatLike
 
 from tracker.errors import OperatorError
+from tracker.sources.devices import plugged_cameras
 
 OPEN_TIMEOUT_MS = 3000
 READ_TIMEOUT_MS = 1000
@@ -140,4 +141,5 @@ def _remedy(address: str) -> str:
         return "try the pipeline with gst-launch-1.0; it must end in appsink"
     if is_network(address):
         return f"nothing answered with video within {OPEN_TIMEOUT_MS / 1000:g} s: check cable, address and power"
-    return "check that it is plugged in, used by no other program and readable by you (group video)"
+    found = ", ".join(plugged_cameras()) or "none"
+    return f"check that it is plugged in, used by no other program and readable by you (group video); found: {found}"
