@@ -50,8 +50,13 @@ def figure(value: float | None, digits: int = 1) -> str:
     return "-" if value is None else f"{value:.{digits}f}"
 
 
-def _row(label: str, *parts: str | tuple[str, str] | Text) -> Text:
-    return Text.assemble((f"{label:<{LABEL}}", QUIET), *parts, overflow="ellipsis", no_wrap=True)
+def _row(label: str, *parts: str | tuple[str, str] | Text, cut: bool = False, style: str = QUIET) -> Table:
+    """Put a label before a text, which goes on below itself where the window is narrow, or is cut there."""
+    row = Table.grid()
+    row.add_column(min_width=LABEL, no_wrap=True)
+    row.add_column(no_wrap=cut, overflow="ellipsis" if cut else "fold")
+    row.add_row(Text(label, style), Text.assemble(*parts))
+    return row
 
 
 def _title(snapshot: Snapshot, where: str) -> Text:
@@ -64,18 +69,16 @@ def _title(snapshot: Snapshot, where: str) -> Text:
     return line
 
 
-def _alarms(alarms: Sequence[Alarm]) -> Iterator[Text]:
+def _alarms(alarms: Sequence[Alarm]) -> Iterator[RenderableType]:
     if not alarms:
         yield _row("alarms", ("none", GOOD))
     for alarm in alarms:
         style = BAD if alarm.level is Level.ALARM else CAREFUL
-        yield Text.assemble(
-            (f"{alarm.level.upper():<{LABEL}}", style), alarm.cause, (f"  {alarm.since_s:.0f} s", QUIET)
-        )
-        yield Text.assemble(" " * LABEL, ("-> " + alarm.remedy, QUIET))
+        yield _row(alarm.level.upper(), alarm.cause, (f"  {alarm.since_s:.0f} s", QUIET), style=style)
+        yield _row("", ("-> " + alarm.remedy, QUIET))
 
 
-def _track(snapshot: Snapshot) -> Text:
+def _track(snapshot: Snapshot) -> Table:
     track = snapshot.track
     return _row(
         "track",
@@ -84,7 +87,7 @@ def _track(snapshot: Snapshot) -> Text:
     )
 
 
-def _pose(pose: Pose | None) -> Iterator[Text]:
+def _pose(pose: Pose | None) -> Iterator[Table]:
     if pose is None:
         return
     metres = " ".join(f"{value:+.3f}" for value in pose.position_m)
@@ -95,7 +98,7 @@ def _pose(pose: Pose | None) -> Iterator[Text]:
     yield _row("attitude", f"roll pitch yaw {degrees} deg, sigma {sigmas} deg")
 
 
-def _rate(snapshot: Snapshot, glyphs: str) -> Text:
+def _rate(snapshot: Snapshot, glyphs: str) -> Table:
     rate = snapshot.rate
     slow = snapshot.track.state == "tracking" and rate.now_hz < 0.97 * rate.need_hz
     return _row(
@@ -105,10 +108,11 @@ def _rate(snapshot: Snapshot, glyphs: str) -> Text:
         f"gap {figure(rate.gap_recent_ms, 0)} ms (ever {figure(rate.gap_ever_ms, 0)}), ",
         f"age {figure(rate.age_ms, 0)} ms ",
         bars(snapshot.history.poses, BARS // 2, glyphs),
+        cut=True,
     )
 
 
-def _nis(nis: Nis) -> Text:
+def _nis(nis: Nis) -> Table:
     if nis.mean_ratio is None or nis.low is None or nis.high is None:
         return _row("NIS", "-")
     inside = nis.low <= nis.mean_ratio <= nis.high
@@ -116,7 +120,7 @@ def _nis(nis: Nis) -> Text:
     return _row("NIS", f"{nis.mean_ratio:.2f}, 95 % of true filters {nis.low:.2f} to {nis.high:.2f}: {verdict}")
 
 
-def _calibration(held: Calibration) -> Text:
+def _calibration(held: Calibration) -> Table:
     if held.epipolar_px is None or held.spacing_mm is None:
         return _row("cameras", (held.wrong or "-", BAD if held.wrong else ""))
     verdict = (held.wrong, BAD) if held.wrong else ("stand as they did", GOOD)
@@ -144,7 +148,7 @@ def _figures(stage: Stage) -> tuple[str, ...]:
     return (stage.name, *(figure(value, 2) for value in (spread.p50, spread.p95, spread.p99, spread.max)))
 
 
-def _camera(camera: CameraView, balls: Sequence[str]) -> Text:
+def _camera(camera: CameraView, balls: Sequence[str]) -> Table:
     seen = ", ".join(f"{ball} {share:.0%}" for ball, share in zip(balls, camera.seen, strict=False))
     clock = ""
     if camera.clock_offset_ms is not None and camera.clock_sigma_ms:
@@ -153,11 +157,11 @@ def _camera(camera: CameraView, balls: Sequence[str]) -> Text:
     return _row(camera.name, f"{camera.rate_hz:.1f} Hz, saw {seen}{clock}{room}")
 
 
-def _links(snapshot: Snapshot) -> Iterator[Text]:
+def _links(snapshot: Snapshot) -> Iterator[Table]:
     for place, link in enumerate(snapshot.links):
         yield _row("link", *_link(link))
         if place < len(snapshot.far_ends):
-            yield Text(f"{'':<{LABEL}}{snapshot.far_ends[place]}")
+            yield _row("", str(snapshot.far_ends[place]))
 
 
 def _link(link: LinkState) -> Iterator[str | tuple[str, str]]:
@@ -167,7 +171,7 @@ def _link(link: LinkState) -> Iterator[str | tuple[str, str]]:
     yield f", {link.sent} sent, {link.dropped} dropped{superseded}"
 
 
-def _log(snapshot: Snapshot) -> Iterator[Text]:
+def _log(snapshot: Snapshot) -> Iterator[Table]:
     log = snapshot.log
     if log is None:
         yield _row("log", "off")
@@ -176,6 +180,6 @@ def _log(snapshot: Snapshot) -> Iterator[Text]:
     yield _row("log", f"{log.path} {log.size_bytes / 1e6:.1f} MB", (trouble, BAD))
 
 
-def _rejected(snapshot: Snapshot) -> Iterator[Text]:
+def _rejected(snapshot: Snapshot) -> Iterator[Table]:
     if snapshot.rejected:
         yield _row("left out", ", ".join(f"{reason} {count}" for reason, count in snapshot.rejected.items()))

@@ -155,6 +155,12 @@ def test_the_page_fits_eighty_columns_whatever_the_names() -> None:
     assert max(len(line) for line in drawn(watched).splitlines()) <= 80
 
 
+def test_a_narrow_window_breaks_what_links_say_and_cuts_none_of_it() -> None:
+    watched = Watched(around=Surroundings((LinkState("serial:/dev/ttyACM0:921600", False, "gone " * 9, 1, 2, 3),)))
+    watched.fly(*turns(200))
+    assert ", 1 sent, 2 dropped, 3 superseded" in " ".join(drawn(watched, 60).split())
+
+
 def test_without_unicode_the_page_is_plain_ascii() -> None:
     watched = Watched()
     watched.fly(*turns(200))
