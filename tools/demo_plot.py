@@ -16,6 +16,7 @@ from tracker.types import Array
 _COMMANDED, _TRUE, _ESTIMATED = "#9a9a9a", "#1f4e79", "#d9722e"
 _AXES = ("#c0392b", "#2e8b57", "#2c6fbb")
 _BAND = "#f1f1ef"
+_PHASE_ROOM = 0.16  # of the curves' height, above them for the phases' names and below
 # Rows that turn room points (3,) into the two coordinates of a view.
 _ABOVE = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
 _FACING = np.array([[np.sqrt(0.5), -np.sqrt(0.5), 0.0], [0.0, 0.0, 1.0]])
@@ -76,6 +77,8 @@ def _attitude(axes: Axes, flight: Flight) -> None:
     lines = [*axes.get_legend_handles_labels()[0], *right.get_legend_handles_labels()[0]]
     axes.legend(handles=lines, loc="lower right", bbox_to_anchor=(1.0, 1.0), fontsize=8, ncols=5, frameon=False)
     axes.set_xlim(float(flight.t_s[0]), float(flight.t_s[-1]))
+    for each in (axes, right):
+        each.margins(y=_PHASE_ROOM)
 
 
 def _shade_phases(axes: Axes, flight: Flight) -> None:
@@ -88,8 +91,8 @@ def _shade_phases(axes: Axes, flight: Flight) -> None:
             axes.axvspan(start_s, end_s, color=_BAND, zorder=0, lw=0)
         if end_s - start_s > 0.03 * float(flight.t_s[-1]):
             axes.text(
-                (start_s + end_s) / 2, 0.02, str(flight.phase[first]), transform=axes.get_xaxis_transform(),
-                ha="center", va="bottom", fontsize=8, color="#555555",
+                (start_s + end_s) / 2, 0.98, str(flight.phase[first]), transform=axes.get_xaxis_transform(),
+                ha="center", va="top", fontsize=8, color="#555555",
             )  # fmt: skip
 
 
