@@ -136,6 +136,11 @@ class Gauges:
         rising_ns = sorted(self._recent_ns)
         return [rising_ns[math.ceil(share * len(rising_ns)) - 1] / 1e6 if rising_ns else None for share in shares]
 
+    @property
+    def recent_is_whole(self) -> bool:
+        """Say whether enough datagrams went for one of a hundred of them to mean something."""
+        return len(self._recent_ns) == RECENT
+
     def nis(self) -> tuple[float, int]:
         """Return the sums of NIS and of degrees of freedom over the window's updates."""
         bins = self.bins.last(WINDOW)

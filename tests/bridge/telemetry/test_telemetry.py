@@ -18,7 +18,7 @@ from bridge.telemetry.parse import from_bytes
 from bridge.telemetry.snapshot import MAX_BYTES, VERSION, to_bytes
 from bridge.telemetry.states import LogState, Surroundings
 from bridge.wire import LinkState, Sent
-from tests.bridge.recordings import PERIOD_NS, START_NS, record, turns
+from tests.bridge.recordings import PERIOD_NS, START_NS, Turn, record, turns
 from tests.bridge.telemetry.watched import UP, Watched
 from tracker.errors import OperatorError
 from tracker.types import Silence, Step, TrackState
@@ -89,6 +89,23 @@ def test_a_lost_track_is_said_while_nothing_comes() -> None:
         watched.wait(end_ns + k * SECOND_NS // 5, TrackState.LOST)
     assert "track_lost" in watched.names_of_alarms()
     assert watched.snapshot().rate.now_hz == 0.0
+
+
+def slow(turn: Turn) -> Turn:
+    """Return a turn whose datagrams took 90 ms more."""
+    event, step, sent, now_ns = turn
+    return event, step, tuple(each._replace(sent_ns=each.sent_ns + 90 * MS) for each in sent), now_ns
+
+
+def test_a_slow_first_pose_is_no_alarm_and_slow_ones_all_along_are() -> None:
+    flight = turns(600)
+    for first, alarmed in ((1, False), (600, True)):
+        watched = Watched()
+        raised: set[str] = set()
+        for each in (*map(slow, flight[:first]), *flight[first:]):
+            watched.fly(each)
+            raised |= watched.names_of_alarms()
+        assert ("latency" in raised) is alarmed
 
 
 def test_hostile_names_and_texts_never_outgrow_a_datagram() -> None:
