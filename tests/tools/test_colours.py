@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from bridge.settings import load_settings
-from tests.system.recordings import LINK, run, short_copy, summary_of
+from tests.system.recordings import LINK, images, run, short_copy, summary_of
 from tests.tools.test_cli import LAB, posebridge, refusal
 from tools.colours.footage import KEPT, Gathering
 from tools.colours.write import recoloured
@@ -64,6 +64,36 @@ def test_footage_without_the_marker_is_one_line(lab_protocol: Path, tmp_path: Pa
     line = refusal("colours", "--source", f"recording:{recording}", "--write", tmp_path / "a.toml")
     assert "no marker in any of 3 instants" in line
     assert not (tmp_path / "a.toml").exists()
+
+
+def filmed(recording: Path, folder: Path) -> str:
+    """Make videos, which bring no calibration, of a recording; return the source."""
+    paths = [folder / f"{camera}.avi" for camera in (0, 1)]
+    for camera, path in enumerate(paths):
+        writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 15.0, (640, 480))
+        for each in images(recording, camera):
+            image = cv2.imread(str(each))
+            assert image is not None
+            writer.write(image)
+        writer.release()
+    return "video:" + ",".join(map(str, paths))
+
+
+def test_before_anybody_knows_where_the_cameras_stand_colours_are_learned_by_what_moves(
+    lab_protocol: Path, tmp_path: Path
+) -> None:
+    config, picture, learned = tmp_path / "new.toml", tmp_path / "a.png", tmp_path / "learned.toml"
+    config.write_text(LAB.replace("2.25],", "2.5],", 1).replace("hue_deg = 23.0", "hue_deg = 8.0"), encoding="utf-8")
+    source = filmed(short_copy(lab_protocol, tmp_path / "short", 12), tmp_path)
+    done = posebridge("colours", "--config", config, "--source", source, "--picture", picture, "--write", learned)
+    assert done.returncode == 1, done.stderr
+    assert "Good to calibrate the room with" in done.stdout
+    assert cv2.imread(str(picture)) is not None
+    hues_deg = [ball.hue_deg for ball in load_settings(learned).marker.balls]
+    assert hues_deg == pytest.approx([56.0, 126.0, 24.0], abs=8.0)  # of the balls, as config/lab.toml has them
+    as_json = posebridge("colours", "--config", config, "--source", source, "--json")
+    figures = json.loads(as_json.stdout)
+    assert (figures["good"], figures["calibrated"], figures["seen"]) == (False, False, {"cam0": 12, "cam1": 12})
 
 
 def test_what_cannot_be_is_refused_before_any_footage_is_read(tmp_path: Path) -> None:

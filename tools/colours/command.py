@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Mapping
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
 from rich.console import Console
 
-from bridge.settings import Settings, config_path, load_settings
+from bridge.settings import ChosenRig, Settings, config_path, load_settings
 from bridge.settings.tuning import tuning_of
+from tools.colours.first import draw_first, first_json, first_text
 from tools.colours.footage import Gathering, gather
 from tools.colours.picture import draw_palette
 from tools.colours.report import to_json, to_text
-from tools.colours.verdict import Verdict, judge
+from tools.colours.verdict import judge
 from tools.colours.write import check_target, recoloured, write_config
 from tools.open_source import open_source
 from tools.request import Clocks
 from tracker.errors import OperatorError
-from tracker.palette.learn import Palette, learn
-from tracker.rig import Rig
+from tracker.palette.learn import NoMarkerError, learn
+from tracker.palette.moving import FirstLook, look_first
+from tracker.rig import Colour, Rig
 
 LEAST_FRAMES, MOST_FRAMES = 10, 100_000
 
@@ -48,8 +51,10 @@ class ColoursRequest:
             )
 
 
-def run_colours(request: ColoursRequest, clocks: Clocks) -> Verdict:
-    """Learn, show and write.
+def run_colours(request: ColoursRequest, clocks: Clocks) -> bool:
+    """Learn, show and write; say whether the colours are good to fly with.
+
+    Cameras of which nobody knows where they stand are looked through one at a time (`tools.colours.first`).
 
     Raises:
         OperatorError: bad input, or no marker in the footage.
@@ -59,19 +64,36 @@ def run_colours(request: ColoursRequest, clocks: Clocks) -> Verdict:
     if request.picture is not None:
         check_target(request.picture, "--picture", overwrite=True)
     settings = load_settings(request.config)
-    rig, gathering = _watch(request, settings, clocks)
-    palette = learn(gathering.kept, rig, tuning_of(settings.tracker))
+    chosen, gathering = _watch(request, settings, clocks)
+    try:
+        palette = learn(gathering.kept, chosen.rig, tuning_of(settings.tracker))
+    except NoMarkerError:
+        if not chosen.nominal:
+            raise
+        _show_first(request, look_first(gathering.kept, chosen.rig), gathering, chosen.rig)
+        return False
     verdict = judge(palette)
     if request.picture is not None:
         draw_palette(palette, request.picture)
     if request.write is not None:
-        _write(request.write, request.config, palette)
+        _write(request.write, request.config, {lesson.name: lesson.new for lesson in palette.balls})
     page = to_json(palette, verdict) if request.as_json else to_text(palette, verdict, request.source)
     sys.stdout.write(page + "\n")
-    return verdict
+    return verdict.good
 
 
-def _watch(request: ColoursRequest, settings: Settings, clocks: Clocks) -> tuple[Rig, Gathering]:
+def _show_first(request: ColoursRequest, look: FirstLook, gathering: Gathering, rig: Rig) -> None:
+    """Show and write what the cameras showed one at a time."""
+    if request.picture is not None:
+        draw_first(look, gathering.kept, rig, request.picture)
+    if request.write is not None:
+        names = [ball.name for ball in rig.marker.balls]
+        _write(request.write, request.config, dict(zip(names, look.colours, strict=True)))
+    page = first_json(look, rig) if request.as_json else first_text(look, rig, request.source)
+    sys.stdout.write(page + "\n")
+
+
+def _watch(request: ColoursRequest, settings: Settings, clocks: Clocks) -> tuple[ChosenRig, Gathering]:
     """Read the source."""
     console = Console(stderr=True)
     with ExitStack() as stack:
@@ -82,19 +104,17 @@ def _watch(request: ColoursRequest, settings: Settings, clocks: Clocks) -> tuple
         if opened.live:
             said = f"watching {request.frames} frames of each camera: carry the vehicle slowly through the room"
             console.print(f"posebridge: {said}", soft_wrap=True, highlight=False)
-        rig = opened.chosen.rig
-        sizes_px = tuple((camera.width_px, camera.height_px) for camera in rig.cameras)
+        sizes_px = tuple((camera.width_px, camera.height_px) for camera in opened.chosen.rig.cameras)
         gathering = gather(opened.source, sizes_px, request.frames)
     if not gathering.kept:
         raise OperatorError(
             f"colours {request.source}: no instant with a picture of each of {len(sizes_px)} cameras, within 50 ms and "
             "of the calibration's size; check that every camera gives frames"
         )
-    return rig, gathering
+    return opened.chosen, gathering
 
 
-def _write(target: Path, config: str, palette: Palette) -> None:
+def _write(target: Path, config: str, colours: Mapping[str, Colour]) -> None:
     path = config_path(config)
-    colours = {lesson.name: lesson.new for lesson in palette.balls}
     text = path.read_text(encoding="utf-8")
     write_config(target, recoloured(text, colours, path.resolve().parent, target.resolve().parent))

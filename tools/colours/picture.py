@@ -37,7 +37,15 @@ def draw_palette(palette: Palette, path: Path) -> None:
     for column in columns:
         panels += [_padded(column, height), np.full((height, SEAM, 3), PAPER, dtype=np.uint8)]
     sheet = np.hstack(panels[:-1])
-    sheet = np.vstack((sheet, _legend(palette, sheet.shape[1])))
+    write_picture(np.vstack((sheet, _legend(palette, sheet.shape[1]))), path)
+
+
+def write_picture(sheet: Image, path: Path) -> None:
+    """Write a PNG.
+
+    Raises:
+        OperatorError: the file cannot be written.
+    """
     try:
         written = cv2.imwrite(str(path), sheet)
     except cv2.error:  # no format of that suffix
@@ -61,10 +69,10 @@ def _column(palette: Palette, seen: Seen, frame: Frame) -> Image:
             true = at is not None and float(np.linalg.norm(blob.uv_px - at.uv_px)) < at.radius_px + 1.5
             name = palette.balls[ball].name
             if true:
-                _circle(image, blob.uv_px, f"{name} {blob.area_px:.0f} px", WHITE)
+                circle(image, blob.uv_px, f"{name} {blob.area_px:.0f} px", WHITE)
             elif not any(clash.camera == frame.camera and _within(blob.uv_px, clash) for _, clash in clashes):
-                _circle(image, blob.uv_px, f"{name}? {blob.area_px:.0f} px", FALSE)
-    _text(image, camera.name, (10, 22), WHITE, 0.6)
+                circle(image, blob.uv_px, f"{name}? {blob.area_px:.0f} px", FALSE)
+    write_on(image, camera.name, (10, 22), WHITE, 0.6)
     return np.vstack((image, _strip(palette, seen, frame)))
 
 
@@ -73,7 +81,8 @@ def _within(uv_px: Array, clash: Clash) -> bool:
     return bool(region.left - 2 <= uv_px[0] <= region.right + 1 and region.top - 2 <= uv_px[1] <= region.bottom + 1)
 
 
-def _circle(image: Image, uv_px: Array, label: str, colour: Bgr) -> None:
+def circle(image: Image, uv_px: Array, label: str, colour: Bgr) -> None:
+    """Draw a circle round a place, with a label beside it."""
     u, v = (round(float(x)) for x in uv_px)
     cv2.circle(image, (u, v), 11, (0, 0, 0), 3, cv2.LINE_AA)
     cv2.circle(image, (u, v), 11, colour, 1, cv2.LINE_AA)
@@ -84,10 +93,10 @@ def _label(image: Image, label: str, at: tuple[int, int], reach: int, colour: Bg
     """Write a label to the right of a place, or to its left where the picture ends."""
     (width, _), _ = cv2.getTextSize(label, _FONT, 0.42, 1)
     left = at[0] + reach if at[0] + reach + width < image.shape[1] else max(at[0] - reach - width, 2)
-    _text(image, label, (left, min(max(at[1] + 4, 12), image.shape[0] - 4)), colour, 0.42)
+    write_on(image, label, (left, min(max(at[1] + 4, 12), image.shape[0] - 4)), colour, 0.42)
 
 
-def _text(image: Image, text: str, at: tuple[int, int], colour: Bgr, size: float) -> None:
+def write_on(image: Image, text: str, at: tuple[int, int], colour: Bgr, size: float) -> None:
     """Write on a darkened ground, legible on any picture."""
     (width, height), base = cv2.getTextSize(text, _FONT, size, 1)
     ground = image[max(at[1] - height - 3, 0) : at[1] + base, max(at[0] - 2, 0) : at[0] + width + 2]

@@ -26,7 +26,7 @@ def to_text(palette: Palette, verdict: Verdict, source: str) -> str:
         f"  seen in {', '.join(names)}",
     ]
     for lesson, reasons in zip(palette.balls, verdict.against, strict=True):
-        lines += [_row("old", lesson.name, lesson.old), _row("new", "", lesson.new) + _seen(lesson)]
+        lines += [row_of("old", lesson.name, lesson.old), row_of("new", "", lesson.new) + _seen(lesson)]
         lines += [f"{'':<10}not good: {reason}" for reason in reasons] or [f"{'':<10}good"]
     lines += ["", *_background(palette)]
     lines += [f"not good: {reason}" for reason in verdict.general]
@@ -72,7 +72,8 @@ def to_json(palette: Palette, verdict: Verdict) -> str:
     return json.dumps(figures, indent=2)
 
 
-def _row(which: str, name: str, colour: Colour) -> str:
+def row_of(which: str, name: str, colour: Colour) -> str:
+    """Return a box as a row of the page. which: old or new."""
     hue = f"{colour.hue_deg:.1f} +/- {colour.hue_tolerance_deg:.1f}"
     return f"{name:<10}{which:>9}{hue:>16}{colour.saturation_min:>12.2f}{colour.value_min:>8.2f}"
 

@@ -35,7 +35,7 @@ def colours(
     from tools.colours.command import ColoursRequest, run_colours
 
     request = ColoursRequest(config, source, frames, picture, write, overwrite, json)
-    if not run_colours(request, clocks_of(context)).good:
+    if not run_colours(request, clocks_of(context)):
         raise typer.Exit(EXIT_COLOURS_NOT_GOOD)
 
 

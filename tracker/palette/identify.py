@@ -68,7 +68,7 @@ def identify(spots: Mapping[int, Spots], rig: Rig, slack_m: float, tilt_limit_ra
                 camera: spots[camera].chroma[[meetings[k].spots[side] for k in choice]]
                 for side, camera in enumerate((a, b))
             }
-            colour = sum(_colour_misfit(found, wanted) for found in seen.values())
+            colour = sum(colour_misfit(found, wanted) for found in seen.values())
             if colour > MOST_COLOUR * 4 * len(rig.marker) or (best is not None and colour >= best.misfit):
                 continue
             found = _posed([meetings[k].point for k in choice], rig.marker, slack_m, tilt_limit_rad)
@@ -147,7 +147,7 @@ def _shaped(points: Sequence[Point], marker: Marker, slack_m: float) -> Iterator
     yield from grown(())
 
 
-def _colour_misfit(found: Array, wanted: Array) -> float:
+def colour_misfit(found: Array, wanted: Array) -> float:
     """Return how little colours (n, 2) are the wanted ones under one cast, in squared sigma.
 
     The cast c that minimises sum |d_i - c|^2 / s^2 + |c|^2 / q^2 is the mean of d times n q^2 / (n q^2 + s^2).

@@ -36,6 +36,10 @@ MOST_PIXELS = 1_500_000  # of background to choose boxes by
 SAME_PLACE_M = 0.03  # a pose found by the tracker's search this near to ours is the marker
 
 
+class NoMarkerError(OperatorError):
+    """The marker was found in no instant: it was not shown, or the cameras do not stand where the rig says."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Seen:
     """An instant in which the marker was found: its frames, pose and balls."""
@@ -104,7 +108,7 @@ def learn(instants: Sequence[Instant], rig: Rig, tuning: Tuning) -> Palette:
         rig: cameras, and the marker with the colours to start from.
         tuning: the tracker's limits.
     Raises:
-        OperatorError: the marker was found in none of them.
+        NoMarkerError: the marker was found in none of them.
     """
     seen = _find_marker(instants, rig, tuning)
     pixels = _pixels(seen, rig)
@@ -156,7 +160,7 @@ def _find_marker(instants: Sequence[Instant], rig: Rig, tuning: Tuning) -> list[
         ball.name for b, ball in enumerate(rig.marker.balls) if all(x.ball != b for one in seen for x in one.balls)
     ]
     if missing:
-        raise OperatorError(
+        raise NoMarkerError(
             f"colours: no marker in any of {len(instants)} instants ({', '.join(missing)} not seen by two cameras at "
             "the marker's sides); carry the vehicle upright through the room where two cameras see it, and check the "
             "calibration and [[marker.balls]] position_mm, radius_mm"

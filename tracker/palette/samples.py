@@ -44,7 +44,7 @@ def ball_pixels(frame: Frame, rig: Rig, p_BinW: Array, R_BtoW: Array) -> list[Ba
         centre = _centre(frame.image, uv_px[b], radius_px)
         if centre is None or np.linalg.norm(centre - uv_px[b]) > NEAR_RADII * radius_px + 1.0:
             continue
-        inner = _disc(frame.image, centre, max(radius_px - EDGE_PX, 1.0))
+        inner = disc_pixels(frame.image, centre, max(radius_px - EDGE_PX, 1.0))
         if len(inner):
             found.append(BallPixels(frame.camera, b, centre, radius_px, inner))
     return found
@@ -85,7 +85,7 @@ def _centre(image: Image, uv_px: Array, radius_px: float) -> Array | None:
     return np.array([u + float((weight * x).sum()) / total, v + float((weight * y).sum()) / total])
 
 
-def _disc(image: Image, uv_px: Array, radius_px: float) -> Image:
+def disc_pixels(image: Image, uv_px: Array, radius_px: float) -> Image:
     """Return the pixels (n, 3) within a radius of a centre that look like its middle."""
     u, v = (round(float(x)) for x in uv_px)
     half = int(np.ceil(radius_px)) + 1
