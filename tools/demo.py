@@ -24,6 +24,7 @@ from bridge.summary import Summary, to_text
 from bridge.wire import Sent
 from tools.demo_plot import draw_flight
 from tools.request import Clocks, DemoRequest, Pace
+from tools.screen import screen
 from tools.seen_picture import draw_seen
 from tools.session import links_of, recorder_of, telemetry_of, tracker_of
 from tools.simulate.autopilot.vessel import Mode
@@ -68,7 +69,7 @@ def run_demo(request: DemoRequest, clocks: Clocks, console: Console | None = Non
     Raises:
         OperatorError: a folder that cannot be made, or too short a time.
     """
-    console = console or Console(stderr=True)
+    console = console or screen(stderr=True)
     surroundings, helicopter = Surroundings(), Helicopter()
     mission = Mission(request.duration_s, surroundings.floor_z_m + helicopter.skid_m)
     make_folder(request.out)
@@ -229,7 +230,7 @@ def _leave(result: DemoResult, request: DemoRequest) -> None:
     held = "held its path" if result.verdict.passed else "DID NOT hold its path"
     title = f"posebridge demo: {request.duration_s:g} s, seed {request.seed}, the helicopter {held}"
     draw_flight(result.flight, title, request.out / PLOT)
-    report = Console()
+    report = screen()
     report.print(to_text(result.summary), soft_wrap=True)
     report.print(result.verdict.to_table())
     report.print(f"{held[0].upper()}{held[1:]}. Log, summary, verdict and picture: {request.out}", soft_wrap=True)

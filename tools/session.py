@@ -33,6 +33,7 @@ from bridge.telemetry.telemetry import Telemetry
 from tools.kept import keep
 from tools.open_source import OpenedSource, open_source
 from tools.request import Clocks, Pace, RunRequest
+from tools.screen import screen
 from tools.steady import steady
 from tools.summary_file import check_summary_path, write_summary
 from tracker.errors import OperatorError
@@ -53,13 +54,13 @@ def run_session(request: RunRequest, clocks: Clocks) -> None:
         OperatorError: a source, link, log or summary that cannot be opened.
         KeyboardInterrupt: the operator ended the run.
     """
-    console = Console(stderr=True)
+    console = screen(stderr=True)
     _check_outputs(request)
     with ExitStack() as stack:
         opened = open_source(request.source, request.settings, clocks)
         stack.enter_context(opened.source)
         for warning in opened.warnings:
-            console.print(f"posebridge: warning: {warning}", style="yellow", soft_wrap=True, highlight=False)
+            console.print(f"posebridge: warning: {warning}", style="yellow", soft_wrap=True)
         outlet = links_of(request.settings, clocks, logged=request.log is not None)
         stack.callback(outlet.close)
         tracker = tracker_of(request.settings, opened.chosen.rig, clocks)
@@ -98,10 +99,10 @@ def _report(outlets: Outlets, request: RunRequest, console: Console, source_trou
     """Give the run's figures, an interrupted one's too, on stdout; what went wrong on stderr, quiet or not."""
     summary = outlets.summary(None if request.log is None else str(request.log))
     if not request.quiet:
-        Console().print(to_text(summary), soft_wrap=True)
+        screen().print(to_text(summary), soft_wrap=True)
     frames = "" if outlets.recorder is None else outlets.recorder.state().frames
     for trouble in (*source_troubles, *_troubles(summary, outlets.monitor.last_rejection, frames)):
-        console.print(f"posebridge: warning: {trouble}", style="yellow", soft_wrap=True, highlight=False)
+        console.print(f"posebridge: warning: {trouble}", style="yellow", soft_wrap=True)
     if request.summary is not None:
         write_summary(request.summary, summary)
 

@@ -147,6 +147,16 @@ def test_a_table_goes_beside_the_log_or_to_stdout(tmp_path: Path) -> None:
     assert (to_stdout.returncode, to_stdout.stdout, to_stdout.stderr) == (0, table, "")
 
 
+def test_a_name_that_looks_like_markup_is_a_name(tmp_path: Path) -> None:
+    for name in ("lab[red].mcap", "a[/b].mcap"):
+        log = tmp_path / name
+        log.parent.mkdir(exist_ok=True)
+        record(log, turns(2))
+        assert posebridge("export", log, "--format", "tum").stderr == (
+            f"2 estimates written to {log.with_suffix('.tum')}\n"
+        )
+
+
 def test_a_reader_who_leaves_early_is_no_traceback(tmp_path: Path) -> None:
     log = tmp_path / "flight.mcap"
     record(log, turns(2000))  # more than a pipe holds

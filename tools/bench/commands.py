@@ -8,7 +8,6 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from rich.console import Console
 from rich.table import Table
 
 from bridge.settings import Settings
@@ -21,6 +20,7 @@ from tools.bench.memory import measure_memory
 from tools.bench.rooms import measure_rooms
 from tools.bench.speed import Speed, measure_speed
 from tools.request import Clocks, CpuClocks
+from tools.screen import screen
 
 WIDTH = 140  # of the accuracy table; a narrower terminal wraps it
 
@@ -38,8 +38,8 @@ def bench_accuracy(recordings: list[Path], settings: Settings, clocks: Clocks, a
         table.add_column(column, justify="left" if column in names[:2] else "right", no_wrap=True)
     for result in results:
         table.add_row(*_row(result))
-    console = Console()
-    wide = Console(width=max(console.width, WIDTH))
+    console = screen()
+    wide = screen(width=max(console.width, WIDTH))
     wide.print(table)
     wide.print()
     wide.print(_limits(results))
@@ -68,7 +68,7 @@ def bench_speed(pairs: int, settings: Settings, clocks: Clocks, cpu: CpuClocks, 
     if as_json:
         _print_json(_plain(dataclasses.asdict(result)))
         return
-    console = Console()
+    console = screen()
     core = "one core" if result.pinned else "whatever cores the system gave"
     console.print(f"{result.pairs} pairs on {core}, frames and link in memory, log on disk")
     console.print(
@@ -96,7 +96,7 @@ def bench_memory(pairs: int, settings: Settings, clocks: Clocks, as_json: bool) 
     table = Table("pairs", "resident MB", box=None, pad_edge=False)
     for done, size_mb in result.resident_mb.items():
         table.add_row(str(done), f"{size_mb:.1f}")
-    console = Console()
+    console = screen()
     console.print(table)
     console.print(f"peak {result.peak_mb:.1f} MB, frames in memory included; log {result.log_mb:.1f} MB")
 
@@ -107,7 +107,7 @@ def bench_export(hours: float, rate_hz: float, format: str, cpu: CpuClocks, as_j
     if as_json:
         _print_json(dataclasses.asdict(result))
         return
-    console = Console()
+    console = screen()
     console.print(f"{result.hours:g} h of log, {result.log_mb:.0f} MB, written in {result.write_cpu_s:.1f} s of CPU")
     console.print(f"{result.rows} rows of {result.format} in {result.export_cpu_s:.1f} s of CPU")
     quarters = ", ".join(f"{mb:.0f}" for mb in result.grown_by_quarter_mb)
@@ -127,7 +127,7 @@ def bench_consistency(seeds: int, gamma: float, as_json: bool) -> None:
     for name, unit in units.items():
         table.add_row(f"NEES {name} / 3", *_average(result.nees[name]), f"{result.rms[name]:.3f} {unit}")
     table.add_row("NIS / dof", *_average(result.nis), "")
-    console = Console()
+    console = screen()
     console.print(table)
     console.print(
         f"{result.seeds} flights, gamma {result.gamma:g}, {result.instants} instants, "
@@ -150,8 +150,8 @@ def bench_rooms(settings: Settings, seed: int, as_json: bool) -> None:
         errors = (f"{figure:.3f}" for figure in (r.mm_mean, r.mm_max, r.deg_mean, r.deg_max))
         speeds = (f"{figure:.3f}" for figure in (r.speed_rms_m_s, r.rate_rms_deg_s))
         table.add_row(r.name, f"{r.estimates}/{r.frames}", *errors, f"{r.nees:.2f}", str(r.wrong), *speeds)
-    console = Console()
-    Console(width=max(console.width, WIDTH)).print(table)
+    console = screen()
+    screen(width=max(console.width, WIDTH)).print(table)
 
 
 def bench_calibration(settings: Settings, seeds: int, jpeg_quality: int, as_json: bool) -> None:
@@ -167,8 +167,8 @@ def bench_calibration(settings: Settings, seeds: int, jpeg_quality: int, as_json
     for kind in results:
         through = f", JPEG {kind.jpeg_quality}" if kind.jpeg_quality else ""
         table.add_row(f"{len(kind.rooms)} of {kind.cameras} cameras{through}", *_missed(kind))
-    console = Console()
-    Console(width=max(console.width, WIDTH)).print(table)
+    console = screen()
+    screen(width=max(console.width, WIDTH)).print(table)
     console.print(
         f"claim: {CLAIM_MM:g} mm, {CLAIM_DEG:g} deg, {CLAIM_MS:g} ms of every camera; beyond it so many rooms in "
         "place, turn and clock",

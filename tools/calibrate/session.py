@@ -22,6 +22,7 @@ from tools.calibrate.result import Calibration, calibrate_all
 from tools.calibrate.views import CELLS, Gathering, where_to_go
 from tools.colours.write import check_target
 from tools.request import Clocks
+from tools.screen import screen
 from tracker.errors import OperatorError
 
 ENOUGH_VIEWS, ENOUGH_COVERAGE = 30, 0.85  # of a live camera: it stops by itself
@@ -100,9 +101,9 @@ def look(footage: Footage, request: IntrinsicsRequest) -> Gathering:
     Raises:
         OperatorError: no sharp view of the board at all, or pictures of two sizes.
     """
-    console = Console(stderr=True)
+    console = screen(stderr=True)
     for warning in footage.warnings:
-        console.print(f"posebridge: warning: {warning}", style="yellow", soft_wrap=True, highlight=False)
+        console.print(f"posebridge: warning: {warning}", style="yellow", soft_wrap=True)
     finder = Finder(request.board)
     gathering = Gathering({}, footage.chosen)
     if footage.live:
@@ -166,4 +167,4 @@ def _enough(gathering: Gathering, camera_count: int) -> bool:
 
 
 def _say(console: Console, line: str) -> None:
-    console.print(f"posebridge: {line}", soft_wrap=True, highlight=False)
+    console.print(f"posebridge: {line}", soft_wrap=True)

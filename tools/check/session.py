@@ -21,6 +21,7 @@ from tools.check.request import CheckRequest
 from tools.check.script import Script
 from tools.open_source import open_source
 from tools.request import Clocks
+from tools.screen import screen
 from tools.session import links_of, tracker_of
 from tools.steady import steady
 from tracker.errors import OperatorError
@@ -37,7 +38,7 @@ def run_check(request: CheckRequest, clocks: Clocks) -> bool:
         OperatorError: a source or link that cannot be opened, no autopilot, or a source that ends before the check.
     """
     settings = _settings(request)
-    console = Console(stderr=True)
+    console = screen(stderr=True)
     with ExitStack() as stack:
         events, clock, tracker = _sight(request, settings, clocks, console, stack)
         outlet = links_of(settings, clocks)
@@ -102,16 +103,16 @@ class Terminal:
 
     def tell(self, text: str) -> None:
         """Say what is being done, or what to do."""
-        self._console.print(f"posebridge: {text}", soft_wrap=True, highlight=False, markup=False)
+        self._console.print(f"posebridge: {text}", soft_wrap=True)
 
     def show(self, sections: tuple[Section, ...], unchecked: tuple[str, ...]) -> None:
         """Show the page."""
         if self._as_json:
             sys.stdout.write(to_json(sections, unchecked) + "\n")
             return
-        page = Console()
+        page = screen()
         for row in to_text(sections, unchecked):
-            page.print(row, soft_wrap=True, highlight=False)
+            page.print(row, soft_wrap=True)
 
     def ask(self, wanted: tuple[Write, ...]) -> bool:
         """Ask whether these may be written.
@@ -144,7 +145,7 @@ def _sight(
     opened = open_source(request.source, settings, clocks)
     stack.enter_context(opened.source)
     for warning in opened.warnings:
-        console.print(f"posebridge: warning: {warning}", style="yellow", soft_wrap=True, highlight=False)
+        console.print(f"posebridge: warning: {warning}", style="yellow", soft_wrap=True)
     tracker = tracker_of(settings, opened.chosen.rig, clocks)
     if opened.live:
         return iter(opened.source), HostClock(clocks.monotonic), tracker

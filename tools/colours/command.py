@@ -8,8 +8,6 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-from rich.console import Console
-
 from bridge.settings import ChosenRig, Settings, config_path, load_settings
 from bridge.settings.tuning import tuning_of
 from tools.colours.first import draw_first, first_json, first_text
@@ -20,6 +18,7 @@ from tools.colours.verdict import judge
 from tools.colours.write import check_target, recoloured, write_config
 from tools.open_source import open_source
 from tools.request import Clocks
+from tools.screen import screen
 from tracker.errors import OperatorError
 from tracker.palette.learn import NoMarkerError, learn
 from tracker.palette.moving import FirstLook, look_first
@@ -95,15 +94,15 @@ def _show_first(request: ColoursRequest, look: FirstLook, gathering: Gathering, 
 
 def _watch(request: ColoursRequest, settings: Settings, clocks: Clocks) -> tuple[ChosenRig, Gathering]:
     """Read the source."""
-    console = Console(stderr=True)
+    console = screen(stderr=True)
     with ExitStack() as stack:
         opened = open_source(request.source, settings, clocks)
         stack.enter_context(opened.source)
         for warning in opened.warnings:
-            console.print(f"posebridge: warning: {warning}", style="yellow", soft_wrap=True, highlight=False)
+            console.print(f"posebridge: warning: {warning}", style="yellow", soft_wrap=True)
         if opened.live:
             said = f"watching {request.frames} frames of each camera: carry the vehicle slowly through the room"
-            console.print(f"posebridge: {said}", soft_wrap=True, highlight=False)
+            console.print(f"posebridge: {said}", soft_wrap=True)
         sizes_px = tuple((camera.width_px, camera.height_px) for camera in opened.chosen.rig.cameras)
         gathering = gather(opened.source, sizes_px, request.frames)
     if not gathering.kept:

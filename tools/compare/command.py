@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rich.console import Console
 from rich.table import Table
 
 from tools.compare.figures import Comparison, Difference, compare, nis_share
@@ -16,6 +15,7 @@ from tools.compare.flown import Flown, path_of, read_flown
 from tools.compare.picture import draw_comparison
 from tools.export.outfile import whole_or_absent
 from tools.kept import keep
+from tools.screen import screen
 from tracker.sources.groundtruth import read_ground_truth
 from tracker.types import Array
 
@@ -32,7 +32,7 @@ def run_compare(a: Path, b: Path, truth: Path | None, out: Path | None, as_json:
     reference = None if truth is None else path_of(read_ground_truth(truth))
     keep((a, b), out, "--out")
     comparison = compare(read_flown(a), read_flown(b), reference)
-    errors = Console(stderr=True, soft_wrap=True, highlight=False)
+    errors = screen(stderr=True, soft_wrap=True)
     for log, one in ((a, comparison.a), (b, comparison.b)):
         for loss in one.lost:
             errors.print(f"posebridge: warning: {log}: {loss}", style="yellow")
@@ -116,7 +116,7 @@ def _print(figures: Figures) -> None:
     same = figures["same_mavlink_bytes"]
     said = {True: "the same", False: "differ", None: "-"}[same]
     table.add_row("MAVLink bytes", *(_cell(sum(one["sent"].values())) for one in (a, b)), said)
-    Console().print(table)
+    screen().print(table)
 
 
 def _cell(value: float | None) -> str:

@@ -14,6 +14,7 @@ from tools.demo import DEMO_CONFIG, LOG, SUMMARY, fly, make_folder
 from tools.excite.hover import ExcitedHover
 from tools.excite.manoeuvre import Sequence
 from tools.request import Clocks, DemoRequest
+from tools.screen import screen
 from tools.simulate.autopilot.vessel import Mode
 from tools.simulate.helicopter import Helicopter
 from tools.simulate.world import Surroundings, World
@@ -44,11 +45,11 @@ def fly_plan(request: DemoRequest, sequence: Sequence, clocks: Clocks, console: 
         world = World(mission, START_NS, surroundings, helicopter, request.seed, mission.excitation)
         stack.callback(world.close)
         request = replace(request, duration_s=mission.duration_s)
-        _, summary = fly(request, clocks, load_settings(DEMO_CONFIG), world, console or Console(stderr=True))
+        _, summary = fly(request, clocks, load_settings(DEMO_CONFIG), world, console or screen(stderr=True))
         flown = np.array([moment.p_BinW for moment in world.history])
         landed = world.autopilot.mode is Mode.LANDED
     write_summary(request.out / SUMMARY, summary)
-    report = Console()
+    report = screen()
     report.print(to_text(summary), soft_wrap=True)
     reach_m = np.abs(flown).max(axis=0)
     report.print(f"Flown {'to its end' if landed else 'in part'}; log: {request.out / LOG}", soft_wrap=True)

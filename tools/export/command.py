@@ -13,6 +13,7 @@ from bridge.log.reader import LogReader
 from tools.export.export import ExportTerms, export
 from tools.export.progress import progress
 from tools.export.report import to_text
+from tools.screen import screen
 
 STDOUT = Path("-")
 WIDTH = 140  # of the report where no terminal says otherwise
@@ -25,9 +26,9 @@ def run_export(log: Path, terms: ExportTerms, out: Path | None) -> None:
     Raises:
         OperatorError: see `export`.
     """
-    console = Console(stderr=True, soft_wrap=True, highlight=False)
+    console = screen(stderr=True, soft_wrap=True)
     if not console.is_terminal:
-        console = Console(stderr=True, soft_wrap=True, highlight=False, width=WIDTH)
+        console = screen(stderr=True, soft_wrap=True, width=WIDTH)
     if out == STDOUT:
         with tempfile.TemporaryDirectory() as folder:
             _write(log, terms, Path(folder) / "table", console)

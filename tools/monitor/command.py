@@ -18,6 +18,7 @@ from tools.monitor.attach import Heard, attach
 from tools.monitor.bars import BLOCKS, PLAIN
 from tools.monitor.page import page
 from tools.monitor.review import review, table
+from tools.screen import screen
 from tracker.errors import OperatorError
 
 
@@ -47,7 +48,7 @@ def run_monitor(request: MonitorRequest, stopwatch: Nanoseconds) -> None:
     Raises:
         OperatorError: nothing there to show.
     """
-    console = Console()
+    console = screen()
     if request.log is not None:
         _show_log(request.log, console, json=request.json)
         return

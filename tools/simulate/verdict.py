@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 from rich.table import Table
+from rich.text import Text
 
 from tools.simulate.flight import Flight
 from tools.simulate.mission import Phase
@@ -56,7 +57,7 @@ class Verdict:
         table.add_column("")
         for line in self.lines:
             sign = "<=" if line.at_most else ">="
-            mark = "[green]ok[/]" if line.passed else "[red]MISSED[/]"
+            mark = Text("ok", "green") if line.passed else Text("MISSED", "red")
             table.add_row(line.what, f"{line.value:.3g} {line.unit}", f"{sign} {line.limit:g} {line.unit}", mark)
         return table
 

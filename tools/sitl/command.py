@@ -6,6 +6,7 @@ from rich.console import Console
 
 from bridge.summary import to_text
 from tools.request import Clocks
+from tools.screen import screen
 from tools.sitl.report import SitlReport
 from tools.sitl.session import LOG, REPORT, SitlRequest, fly
 
@@ -16,7 +17,7 @@ WIDTH = 140
 def run_sitl(request: SitlRequest, clocks: Clocks) -> SitlReport:
     """Fly, and print what came of it on stdout."""
     report = fly(request, clocks)
-    console = Console()
+    console = screen()
     console.width = max(console.width, WIDTH)
     show(report, request, console)
     return report
@@ -33,5 +34,5 @@ def show(report: SitlReport, request: SitlRequest, console: Console) -> None:
         console.print(report.faults_table())
         for outcome in report.outcomes:
             for text in outcome.texts:
-                console.print(f"{outcome.fault.name}: autopilot said: {text}", soft_wrap=True, highlight=False)
+                console.print(f"{outcome.fault.name}: autopilot said: {text}", soft_wrap=True)
     console.print(f"Log and report: {request.out / LOG}, {request.out / REPORT}", soft_wrap=True)

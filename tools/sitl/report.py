@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 from rich.table import Table
+from rich.text import Text
 
 from bridge.summary import Summary
 from tools.simulate.autopilot.reports import GUIDED, LAND
@@ -69,7 +70,7 @@ class SitlReport:
                 f"{each.quiet_mm:.0f} mm",
                 f"{each.ekf_error_mm:.0f} mm",
                 f"{each.worst_ratio:.2f}",
-                "[red]ACTED[/]" if each.failsafe else "no",
+                Text("ACTED", "red") if each.failsafe else "no",
             )
         return table
 

@@ -24,6 +24,7 @@ from bridge.settings import Settings, load_settings, rig_of
 from bridge.settings.terms import terms_of
 from bridge.status import StatusLine
 from tools.request import Clocks
+from tools.screen import screen
 from tools.session import recorder_of, telemetry_of, tracker_of
 from tools.simulate.helicopter import Helicopter
 from tools.simulate.mission import Mission
@@ -110,7 +111,7 @@ def fly(request: SitlRequest, clocks: Clocks, console: Console | None = None) ->
     Raises:
         OperatorError: a program that does not start, or an autopilot that does not do what the plan wants.
     """
-    console = console or Console(stderr=True)
+    console = console or screen(stderr=True)
     settings = load_settings(request.config)
     _make_folder(request.out)
     with ExitStack() as stack:
@@ -138,9 +139,9 @@ def _looked_at(request: SitlRequest, world: World, console: Console) -> Iterator
     """See that a program that somebody else started holds the parameters of the flight."""
     if request.connect is None:
         return
-    console.print(f"{request.connect}: taken; waiting for it to ask for physics", highlight=False)
+    console.print(f"{request.connect}: taken; waiting for it to ask for physics")
     yield
-    console.print(f"{request.connect}: it asks; waiting for its other port, reading its parameters", highlight=False)
+    console.print(f"{request.connect}: it asks; waiting for its other port, reading its parameters")
     yield from hold(world, parameters(_CAMERA_DELAY_MS), request.out / PARAMETERS)
 
 

@@ -7,10 +7,11 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
-from rich.console import Console
 from rich.table import Table
+from rich.text import Text
 
 from bridge.settings import load_settings
+from tools.screen import screen
 from tools.sitl.command import WIDTH
 from tools.sitl.mistakes import MISTAKES, Mistake
 from tools.sitl.trial import Trial, attempt
@@ -20,14 +21,14 @@ RESULTS = "mistakes.json"
 
 def run_trials(binary: Path | None, config: str, out: Path, mistakes: Sequence[Mistake] = MISTAKES) -> list[Trial]:
     """Try mistakes, print what came of them on stdout, and leave it in the folder. See `attempt`."""
-    settings, console = load_settings(config), Console()
+    settings, console = load_settings(config), screen()
     console.width = max(console.width, WIDTH)
     out.mkdir(parents=True, exist_ok=True)
     trials = []
     for number, mistake in enumerate(mistakes):
         trial = attempt(mistake, settings, binary, out / f"{number:02d}")
         trials.append(trial)
-        console.print(f"{trial.mistake}: {'; '.join(trial.texts) or 'nothing said'}", soft_wrap=True, highlight=False)
+        console.print(f"{trial.mistake}: {'; '.join(trial.texts) or 'nothing said'}", soft_wrap=True)
     console.print(table_of(trials))
     (out / RESULTS).write_text(json.dumps([asdict(each) for each in trials], indent=2) + "\n", encoding="utf-8")
     return trials
@@ -44,8 +45,8 @@ def table_of(trials: Sequence[Trial]) -> Table:
             f"{each.ekf_error_mm:.0f} mm",
             f"{each.off_path_mm:.0f} mm",
             f"{each.worst_ratio:.2f}",
-            "[red]lost[/]" if each.lost_position else "kept",
-            "[red]ACTED[/]" if each.landed else "no",
+            Text("lost", "red") if each.lost_position else "kept",
+            Text("ACTED", "red") if each.landed else "no",
         )
         if each.grounded:
             table.add_row(f"  {each.grounded}")

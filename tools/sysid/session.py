@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rich.console import Console
 from rich.table import Table
 
+from tools.screen import screen
 from tools.sysid.certainty import COVERAGE
 from tools.sysid.identify import identify
 from tools.sysid.log_data import LogData
@@ -33,7 +33,7 @@ def to_table(report: Report) -> None:
         table.add_column(column, justify="left" if column in ("parameter", "unit") else "right")
     for parameter, value, error in zip(PARAMETERS, found.theta, found.certainty.total, strict=True):
         table.add_row(parameter.name, f"{value:.4g}", f"{COVERAGE * error:.2g}", parameter.unit)
-    console = Console()
+    console = screen()
     console.print(table)
     held_out = ", ".join(
         f"{name} {percent:.0f} %"
@@ -45,4 +45,4 @@ def to_table(report: Report) -> None:
     console.print(f"fit on the last third, not seen before: {held_out}", soft_wrap=True)
     console.print(f"coherence: {coherence}; residuals white: {found.whiteness.share:.0%}", soft_wrap=True)
     for warning in report.warnings():
-        Console(stderr=True).print(f"posebridge: warning: {warning}", style="yellow", soft_wrap=True, highlight=False)
+        screen(stderr=True).print(f"posebridge: warning: {warning}", style="yellow", soft_wrap=True)

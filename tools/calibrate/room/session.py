@@ -24,6 +24,7 @@ from tools.calibrate.room.worth import worth_of
 from tools.colours.write import check_target
 from tools.open_source import open_source
 from tools.request import Clocks
+from tools.screen import screen
 from tracker.camera import Camera
 from tracker.errors import OperatorError
 from tracker.rig import Rig, make_rig
@@ -115,7 +116,7 @@ def run_room(request: RoomRequest, clocks: Clocks) -> Verdict:
 
 def _watched(request: RoomRequest, settings: Settings, clocks: Clocks) -> tuple[Rig, Footage]:
     """Open the source and look for the marker in its frames."""
-    console = Console(stderr=True)
+    console = screen(stderr=True)
     with ExitStack() as stack:
         opened = open_source(request.source, settings, clocks)
         stack.enter_context(opened.source)
@@ -149,4 +150,4 @@ def _with_intrinsics(cameras: tuple[Camera, ...], files: tuple[Path, ...]) -> tu
 
 
 def _say(console: Console, line: str) -> None:
-    console.print(f"posebridge: {line}", soft_wrap=True, highlight=False)
+    console.print(f"posebridge: {line}", soft_wrap=True)
