@@ -36,7 +36,7 @@ app.add_typer(calibrate, name="calibrate")
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the command line and exit: 0 good, 1 not good, 2 something the operator can mend, 130 interrupted."""
+    """Run the command line and exit: 0 done, 1 not good, 2 something the operator can mend, 130 interrupted."""
     sys.exit(run_command_line(sys.argv[1:] if arguments is None else arguments))
 
 
@@ -112,7 +112,7 @@ def posebridge(
 ) -> None:
     """Cameras watch coloured balls on a vehicle; its autopilot gets its pose over MAVLink.
 
-    Exit code 0: done, and good. 1: done, and not good to fly with. 2: something you can mend, told in one line.
-    130: interrupted, links and log closed in order.
+    Exit code 0: done. 1: done, and not good: the path of a demo, colours, a place, a calibration, a check.
+    2: something you can mend, told in one line. 130: interrupted, links and log closed in order.
     """
     context.obj = _real_clocks()
