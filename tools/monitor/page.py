@@ -10,7 +10,7 @@ from rich.text import Text
 
 from bridge.alarms import Alarm, Level
 from bridge.telemetry.compose import EDGES_MS
-from bridge.telemetry.snapshot import Calibration, CameraView, Nis, Pose, Snapshot, Stage
+from bridge.telemetry.snapshot import Calibration, CameraView, Nis, Snapshot, Stage
 from bridge.wire import LinkState
 from tools.monitor.bars import BLOCKS, bars
 
@@ -33,7 +33,7 @@ def page(snapshot: Snapshot, where: str, note: str = "", glyphs: str = BLOCKS) -
         *([Text(note, CAREFUL)] if note else ()),
         *_alarms(snapshot.alarms),
         _track(snapshot),
-        *_pose(snapshot.pose),
+        *_pose(snapshot),
         _rate(snapshot, glyphs),
         _nis(snapshot.nis),
         _calibration(snapshot.calibration),
@@ -87,15 +87,17 @@ def _track(snapshot: Snapshot) -> Table:
     )
 
 
-def _pose(pose: Pose | None) -> Iterator[Table]:
+def _pose(snapshot: Snapshot) -> Iterator[Table]:
+    pose, tracking = snapshot.pose, snapshot.track.state == "tracking"
     if pose is None:
         return
+    old = ("", "") if tracking else (", WHEN LAST SEEN", CAREFUL)
     metres = " ".join(f"{value:+.3f}" for value in pose.position_m)
     sigmas = " ".join(f"{1e3 * value:.2f}" for value in pose.position_sigma_m)
-    yield _row("position", f"x y z {metres} m, sigma {sigmas} mm, speed {pose.speed_m_s:.2f} m/s")
+    yield _row("position", f"x y z {metres} m, sigma {sigmas} mm, speed {pose.speed_m_s:.2f} m/s", old)
     degrees = " ".join(f"{value:+.1f}" for value in pose.euler_deg)
     sigmas = " ".join(f"{value:.2f}" for value in pose.attitude_sigma_deg)
-    yield _row("attitude", f"roll pitch yaw {degrees} deg, sigma {sigmas} deg")
+    yield _row("attitude", f"roll pitch yaw {degrees} deg, sigma {sigmas} deg", old)
 
 
 def _rate(snapshot: Snapshot, glyphs: str) -> Table:

@@ -20,13 +20,14 @@ from bridge.telemetry.post import HOST, Post
 from bridge.telemetry.snapshot import to_bytes
 from bridge.telemetry.states import Surroundings
 from bridge.wire import LinkState
-from tests.bridge.recordings import record, turns
+from tests.bridge.recordings import PERIOD_NS, START_NS, record, turns
 from tests.bridge.telemetry.watched import Watched
 from tools.cli import run_command_line
 from tools.monitor.attach import attach
 from tools.monitor.bars import BLOCKS, PLAIN, bars
 from tools.monitor.page import page
 from tools.monitor.review import review
+from tracker.types import TrackState
 
 SECOND_NS = 1_000_000_000
 
@@ -173,6 +174,14 @@ def test_alarms_stand_above_everything_but_the_title() -> None:
     lines = drawn(watched).splitlines()
     assert lines[1].startswith("ALARM")
     assert any(line.strip().startswith("->") for line in lines[2:5])
+
+
+def test_a_pose_of_a_track_that_is_lost_is_called_old() -> None:
+    watched = Watched()
+    watched.fly(*turns(90))
+    assert "WHEN LAST SEEN" not in drawn(watched, 120)
+    watched.wait(START_NS + 100 * PERIOD_NS, TrackState.LOST)
+    assert drawn(watched, 120).count("WHEN LAST SEEN") == 2
 
 
 def test_an_empty_run_has_a_page_too() -> None:
