@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from bridge.alarms.link_rules import LINK_RULES
 from bridge.alarms.readings import CameraReading, Readings
 from bridge.alarms.rule import Finding, Level, Rule, Verdict, above, below
+from tracker.health.background import LIMIT_PX
 from tracker.types import TrackState
 
 SETTLE_S = 3.0
@@ -190,7 +191,7 @@ def _camera_moved(now: Readings) -> Iterator[Finding]:
 
 
 def _how_it_moved(camera: CameraReading, from_start: bool) -> str:
-    if camera.shift_px:
+    if camera.shift_px > LIMIT_PX:  # else it was the rays that named it
         return (
             f"was moved: the room stands {camera.shift_px:.1f} px off in its picture, "
             f"{camera.at_vehicle_mm:.0f} mm at the vehicle"
@@ -209,7 +210,8 @@ def _cameras_at_odds(now: Readings) -> Iterator[Finding]:
             "",
             Verdict.BAD,
             f"a camera {_since_when(now.from_start)}: {miss}",
-            "land, see which hangs loose; then calibrate the room anew; hang something with corners where they look",
+            "land, see which hangs loose or in another's place; then calibrate the room anew; hang something with "
+            "corners where they look",
         )
 
 

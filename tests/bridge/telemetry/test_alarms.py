@@ -134,6 +134,15 @@ def test_the_remedy_for_a_late_camera_names_the_whole_offset_to_set() -> None:
     assert "clock_offset_ms = 13.0 for left" in alarm.remedy
 
 
+@pytest.mark.parametrize(
+    ("shift_px", "said"), [(4.2, "4.2 px off in its picture, 11 mm"), (0.01, "rays miss the balls")]
+)
+def test_a_camera_that_moved_is_told_by_what_shows_it(shift_px: float, said: str) -> None:
+    camera = CameraReading("left", 20.0, moved=True, shift_px=shift_px, at_vehicle_mm=11.0)
+    (alarm,) = judged((replace(WELL, cameras=(camera,)), 10.0))
+    assert said in alarm.cause
+
+
 def test_time_that_an_alarm_has_stood_counts_from_its_raising() -> None:
     (alarm,) = judged((FAULTS["rate"], 11.0))
     assert alarm.since_s == pytest.approx(10.0, abs=0.4)
