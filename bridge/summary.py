@@ -111,7 +111,7 @@ def to_text(summary: Summary) -> RenderableType:
 def _headline(summary: Summary) -> Text:
     gap = "" if summary.worst_gap_ms is None else f", worst gap {summary.worst_gap_ms:.1f} ms"
     return Text(
-        f"estimates   {summary.estimates_sent} sent at {summary.rate_hz:.1f} Hz{gap}, "
+        f"estimates   {summary.estimates_sent} at {summary.rate_hz:.1f} Hz{gap}, "
         f"track lost {summary.lost} times, {summary.resets} resets"
     )
 

@@ -62,7 +62,7 @@ def test_a_figure_that_is_no_number_is_a_bug_not_bad_json() -> None:
 def test_text_shows_what_went_wrong_beside_what_went_well() -> None:
     text = text_of(RUN)
     for figure in (
-        "300 sent at 15.0 Hz, worst gap 66.7 ms, track lost 1 times, 2 resets",
+        "300 at 15.0 Hz, worst gap 66.7 ms, track lost 1 times, 2 resets",
         "frame to datagram  3.10  5.00  7.70  12.00",
         "rejected    gate 3, late 1",
         "clocks      cam1 -3.21 +- 0.25 ms against the first camera's",
