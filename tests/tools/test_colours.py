@@ -14,7 +14,9 @@ from bridge.settings import load_settings
 from tests.system.recordings import LINK, images, run, short_copy, summary_of
 from tests.tools.test_cli import LAB, posebridge, refusal
 from tools.colours.footage import KEPT, Gathering
+from tools.colours.picture import write_picture
 from tools.colours.write import recoloured
+from tracker.errors import OperatorError
 from tracker.rig import Colour
 from tracker.types import Frame
 
@@ -96,12 +98,19 @@ def test_before_anybody_knows_where_the_cameras_stand_colours_are_learned_by_wha
     assert (figures["good"], figures["calibrated"], figures["seen"]) == (False, False, {"cam0": 12, "cam1": 12})
 
 
+def test_a_picture_that_cannot_be_written_is_one_line(tmp_path: Path, full_disk: Path) -> None:
+    (tmp_path / "a.png").symlink_to(full_disk)
+    with pytest.raises(OperatorError, match="No space left on device"):
+        write_picture(np.zeros((4, 4, 3), dtype=np.uint8), tmp_path / "a.png")
+
+
 def test_what_cannot_be_is_refused_before_any_footage_is_read(tmp_path: Path) -> None:
     there = tmp_path / "there.toml"
     there.write_text("mine")
     assert "5 frames must be 10 to 100000" in refusal("colours", "--frames", "5")
     assert "exists already" in refusal("colours", "--source", "sim:hover", "--write", there)
     assert "create it" in refusal("colours", "--source", "sim:hover", "--picture", tmp_path / "no" / "a.png")
+    assert "ends in .png" in refusal("colours", "--source", "sim:hover", "--picture", there)
     assert there.read_text() == "mine"
 
 
