@@ -32,6 +32,7 @@ from tracker.state import State
 from tracker.types import BallSighting, Reason, Rejected
 
 MAX_SUSPECTS = 8
+POSED = 3  # sightings, which some pose fits whatever they show: their shape tells no liar
 
 
 class Update(NamedTuple):
@@ -55,10 +56,11 @@ def update(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig, pro
     Source: each ball is gated on its innovation (Mahalanobis distance, 2 degrees of freedom), as far as the envelope
         goes. The rest is fitted together. When the sum of squares does not fit its chi-square, the smallest set of
         sightings is left out with which it does, of equal sets the one that leaves least; sets of up to a third of all
-        are tried, among those without which the sum would fall most, then whole cameras. Where a gate shuts a camera
-        out, it lies or the vehicle left the envelope, and the others must fit the noise expected before. The prior is
-        broad against a pixel, so it is the marker's rigid shape that finds the liars. A camera of which most lie shows
-        another time, or the other camera does: then it is between cameras, and none of its sightings is picked out.
+        are tried, among those without which the sum would fall most, then whole cameras. The prior is broad against a
+        pixel, so it is the marker's rigid shape that finds the liars, and more than three must be left: three fit some
+        pose whatever they show. Where a gate shuts a camera out, or leaves so few, it lies or the vehicle left the
+        envelope, and the others must fit the noise expected before. A camera of which most lie shows another time, or
+        the other camera does: then it is between cameras, and none of its sightings is picked out.
     """
     if not sightings:
         return Rejected(Reason.FRAME_GATE, "no sighting near the prediction", ahead.state.t_ns)
@@ -78,9 +80,9 @@ def _chosen(ahead: Prediction, seen: Sighted, rig: Rig, probability: float) -> U
     if not near:
         return Rejected(Reason.FRAME_GATE, "no sighting near the prediction", ahead.state.t_ns)
     batch = batch.part(near)
-    shut_out = far and set(batch.sighted.cameras.tolist()) != set(seen.cameras.tolist())
-    if shut_out and not _expected(ahead, batch, rig, probability):
-        return Rejected(Reason.FRAME_GATE, "a camera is shut out, and the others see a manoeuvre", ahead.state.t_ns)
+    if far and not _borne_out(ahead, batch, seen, rig, probability):
+        detail = "much is far from the prediction, and nothing bears the rest out"
+        return Rejected(Reason.FRAME_GATE, detail, ahead.state.t_ns)
     whole = fit(ahead, batch, rig)
     if whole is None:
         return Rejected(Reason.FRAME_GATE, "the fit runs away", ahead.state.t_ns)
@@ -108,6 +110,18 @@ def _fits(one: Fit, probability: float) -> bool:
     return one.nis <= chi2_limit(probability, len(one.u))
 
 
+def _borne_out(ahead: Prediction, near: Batch, seen: Sighted, rig: Rig, probability: float) -> bool:
+    """Say whether what the gate lets pass is to be believed where it shuts others out.
+
+    More than a pose needs, of every camera, bear each other out by the marker's shape. Others must be what the track
+    expected, and no fewer than were shut out.
+    """
+    kept = near.sighted
+    if len(kept.sightings) > POSED and set(kept.cameras.tolist()) == set(seen.cameras.tolist()):
+        return True
+    return 2 * len(kept.sightings) >= len(seen.sightings) and _expected(ahead, near, rig, probability)
+
+
 def _expected(ahead: Prediction, batch: Batch, rig: Rig, probability: float) -> bool:
     """Say whether sightings fit the noise expected before: manoeuvres explain much of what one camera alone says."""
     one = fit(ahead, batch, rig, adapt=False)
@@ -126,7 +140,7 @@ def _without_few(ahead: Prediction, batch: Batch, whole: Fit, rig: Rig, probabil
     """Return the best fit without up to a third of the sightings, None when none fits."""
     everyone = range(len(batch.sighted.sightings))
     suspects = np.argsort(-whole.gains())[:MAX_SUSPECTS].tolist()
-    for count in range(1, len(everyone) // 3 + 1):
+    for count in range(1, min(len(everyone) // 3, len(everyone) - POSED - 1) + 1):
         tried = [
             fit(ahead, batch.part([i for i in everyone if i not in left_out]), rig)
             for left_out in combinations(suspects, count)
