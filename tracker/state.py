@@ -66,7 +66,7 @@ class State:
         (B), acceleration (W), angular acceleration (B), jerk (W), angular jerk (B), clock offsets of cameras 1, 2, ...;
         n = 23 + cameras.
     levels: (2, levels) probability of each level of `manoeuvre`, for translation and for rotation.
-    noise: (cameras, 2) variance that a camera adds to each fit, and how much is known of it, see `noise`.
+    noise: (cameras, 4) variances that a camera adds to its fits, and how much is known of them, see `noise`.
     manoeuvre_s: how long an acceleration lasts [s].
     """
 
@@ -74,7 +74,7 @@ class State:
     mean: Array
     P: Array
     levels: Array = field(default_factory=lambda: np.ones((2, 1)))
-    noise: Array = field(default_factory=lambda: np.zeros((1, 2)))
+    noise: Array = field(default_factory=lambda: np.zeros((1, 4)))
     manoeuvre_s: float = 1.0
 
     @property

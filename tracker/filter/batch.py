@@ -12,6 +12,7 @@ from tracker.filter.correction import gathered_noise, innovation_covariance, pat
 from tracker.filter.manoeuvre import envelope
 from tracker.filter.matern import MOTIONS, unit_noise
 from tracker.filter.measure import Indices, camera_table, pixels
+from tracker.filter.noise import ALIKE, APART
 from tracker.filter.predict import Prediction
 from tracker.filter.sag import sag_noise
 from tracker.maths.compiled import compiled
@@ -163,7 +164,10 @@ def _covariances(
     for i in range(rows):
         first = i - i % 2
         R[i, first], R[i, first + 1] = covs_px[i, 0], covs_px[i, 1]
-        R[i, i] += noise[cameras[i // 2], 0]
+        R[i, i] += noise[cameras[i // 2], APART]
+        for j in range(i % 2, rows, 2):
+            if cameras[j // 2] == cameras[i // 2]:
+                R[i, j] += noise[cameras[i // 2], ALIKE]
     path = path_noise(H, cameras, lags_s, T)
     B, unit = np.empty(path.shape), unit_noise(dt, T)
     for k in range(len(B)):
