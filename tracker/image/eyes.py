@@ -14,7 +14,7 @@ from tracker.image.look import Look, gaze_of, look_near
 from tracker.image.mounting import Mounting
 from tracker.image.rivals import first_rivals
 from tracker.image.sight import MISFIT
-from tracker.image.tint import Gains, Tint, core_colour
+from tracker.image.tint import NEUTRAL, Gains, Tint, core_colour
 from tracker.image.view import RADIUS, unknown_streak_px, whereabouts
 from tracker.rig import Rig
 from tracker.state import State
@@ -43,6 +43,7 @@ class Eyes:
         self._albums = [Album(camera) for camera in rig.cameras]
         self._behind = [Behind(camera) for camera in rig.cameras]
         self._tints = [Tint() for _ in rig.cameras]
+        self._proven = [NEUTRAL for _ in rig.cameras]  # the light in which all balls were seen last
         self._mounting = Mounting(rig.marker)
         self._gazes = [
             gaze_of(rig, Appearance(), album, room=behind.room)
@@ -100,9 +101,29 @@ class Eyes:
         for index, album in enumerate(self._albums):
             album.draws_left = int(index == whose) if self._settled else None
         look = look_near(frames, self._rig, state, self._gazes, self._mounting.things)
+        self._look_again(frames, state, look)
         smear_px = self._smear_px(state)
         look.blind = smear_px > BLIND_PX
         return look.doubted(SMEAR_DOUBT * smear_px) if look.blind else look
+
+    def _look_again(self, frames: Sequence[Frame], state: State, look: Look) -> None:
+        """Look at images without a ball in the light in which their camera last saw all; believe it if all are there.
+
+        What is before balls for a moment may be taken for another light, in which no ball is seen any more. Fewer than
+        all might be anything of their colours, and would leave the camera with a light that it does not have.
+        """
+        seen = [sighting.camera for sighting in look.sightings]
+        for frame in frames:
+            index, count = frame.camera, seen.count(frame.camera)
+            if count == len(self._rig.marker):
+                self._proven[index] = self._tints[index].gains
+            elif count == 0 and self._proven[index].undoing != self._gazes[index].undoing:
+                gaze, gains = self._gazes[index], self._proven[index]
+                lit = gaze_of(self._rig, gaze.appearance, gaze.album, gains, gaze.room)
+                again = look_near([frame], self._rig, state, {index: lit}, self._mounting.things)
+                if len(again.sightings) == len(self._rig.marker):
+                    self._light_up(index, self._tints[index]._replace(gains=gains))
+                    look.replace(again)
 
     def _may_draw(self, frames: Sequence[Frame]) -> int | None:
         """Return the camera that may draw a template: each that sees now in turn, and none in a lesson's round."""

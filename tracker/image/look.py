@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -102,6 +102,13 @@ class Look:
             sighting, glance.frame, glance.views[ball], glance.fits[ball], glance.appearance, drawn, glance.held[ball]
         )
 
+    def replace(self, other: Look) -> None:
+        """Take over what another look at some of the images gave, in place of what they gave here."""
+        anew = other.glances
+        self.sightings = [one for one in self.sightings if one.camera not in anew] + other.sightings
+        self.rejections = [one for one in self.rejections if one.camera not in anew] + other.rejections
+        self.glances |= anew
+
     def doubted(self, sigma_px: float) -> Look:
         """Return it with sightings that are less sure, by one sigma on each axis [px]."""
         more = sigma_px**2 * np.eye(2)
@@ -129,6 +136,10 @@ class Gaze:
         return Gaze(appearance, known_of(appearance.response), self.colours, self.album, self.undoing, self.room)
 
 
+Gazes = Sequence[Gaze] | Mapping[int, Gaze]
+"""By camera."""
+
+
 def gaze_of(rig: Rig, appearance: Appearance, album: Album, gains: Gains = NEUTRAL, room: Room = NO_ROOM) -> Gaze:
     """Return what a camera looks for to which balls look so, in a light of this colour."""
     undoing = gains.undoing
@@ -136,7 +147,7 @@ def gaze_of(rig: Rig, appearance: Appearance, album: Album, gains: Gains = NEUTR
     return Gaze(appearance, known_of(appearance.response), colours, album, undoing, room)
 
 
-def look_near(frames: Sequence[Frame], rig: Rig, state: State, gazes: Sequence[Gaze], things: Array) -> Look:
+def look_near(frames: Sequence[Frame], rig: Rig, state: State, gazes: Gazes, things: Array) -> Look:
     """Find each ball in each image, in the region where a state, with its covariance, expects it.
 
     Args:
