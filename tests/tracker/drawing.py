@@ -7,6 +7,7 @@ from collections.abc import Collection
 import cv2
 import numpy as np
 
+from tests.tracker.paper_rig import paper_rig
 from tests.tracker.rigs import at
 from tracker.camera import Camera
 from tracker.rig import Ball, Rig
@@ -15,7 +16,8 @@ from tracker.types import Array, Frame, Image
 
 FINE = 8  # samples a pixel along each axis
 ROOM_BGR = (96.0, 90.0, 84.0)
-LIGHT_inC = np.array([-0.4, -0.6, -0.69])
+LIGHT_inW = np.array([0.33, -0.24, 0.91])
+VIEW = paper_rig().cameras[0]
 AMBIENT = 0.45
 
 
@@ -39,7 +41,7 @@ def frame(
     for b, ball in enumerate(rig.marker.balls):
         if b not in hidden and depths_m[b] > 0:
             uv_px = view.project(points_inW[b : b + 1])[0][0]
-            draw_ball(canvas, uv_px, view.focal_px * ball.radius_m / depths_m[b], ball)
+            draw_ball(canvas, uv_px, view.focal_px * ball.radius_m / depths_m[b], ball, view)
     return Frame(camera, t_ns, developed(canvas, noise), available_ns=t_ns)
 
 
@@ -49,8 +51,17 @@ def empty_canvas(view: Camera) -> Array:
     return np.asarray(np.broadcast_to(np.array(ROOM_BGR) + slope, (view.height_px, view.width_px, 3)).copy())
 
 
-def draw_ball(canvas: Array, uv_px: Array, radius_px: float, ball: Ball) -> None:
-    """Put a matt ball on the canvas, each pixel the mean of FINE x FINE samples."""
+def light_along(ray_inC: Array, light_inC: Array) -> Array:
+    """Return the light's direction (3,) seen along a ray: right, down, and from the ball back to the camera."""
+    back = -ray_inC / np.linalg.norm(ray_inC)
+    right = np.cross((0.0, -1.0, 0.0), back)
+    right /= np.linalg.norm(right)
+    return np.array((right, -np.cross(back, right), back)) @ light_inC
+
+
+def draw_ball(canvas: Array, uv_px: Array, radius_px: float, ball: Ball, view: Camera = VIEW) -> None:
+    """Put a matt ball on a camera's canvas, each pixel the mean of FINE x FINE samples."""
+    right, down, back = light_along(view.bearings(uv_px[None])[0], view.R_CtoW.T @ LIGHT_inW)
     half = int(np.ceil(radius_px)) + 2
     left, top = np.floor(uv_px).astype(int) - half
     size = 2 * half + 2
@@ -59,7 +70,7 @@ def draw_ball(canvas: Array, uv_px: Array, radius_px: float, ball: Ball) -> None
     y = (fine[:, None] + top - uv_px[1]) / radius_px
     inside = x * x + y * y < 1.0
     towards = np.sqrt(np.maximum(0.0, 1.0 - x * x - y * y))
-    lit = np.maximum(0.0, x * LIGHT_inC[0] + y * LIGHT_inC[1] - towards * LIGHT_inC[2])
+    lit = np.maximum(0.0, x * right + y * down + towards * back)
     shade = (AMBIENT + (1.0 - AMBIENT) * lit) * inside
     coverage, light = (a.reshape(size, FINE, size, FINE).mean(axis=(1, 3)) for a in (inside.astype(float), shade))
     height, width = canvas.shape[:2]

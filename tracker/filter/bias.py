@@ -18,7 +18,7 @@ from tracker.rig import Rig
 from tracker.state import State
 from tracker.types import Array
 
-LIGHT_PX = 0.04  # one sigma that light learned from balls leaves: 0.02 where one lamp makes it, 0.06 where several do
+LIGHT_PX = 0.03  # one sigma that light learned from balls leaves: 0.02 where one lamp makes it, 0.04 where several do
 STREAK_SHARE = 0.01  # of the streak: what it leaves
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
@@ -54,12 +55,15 @@ class Appearance:
         shades = self.shades(camera, *_ray(ball, camera))
         return replace(ball, uv_px=place, shades=shades, response=self.response, drawn=None)
 
-    def learned(self, image: Image, camera: Camera, ball: Expected, found: Centre) -> Appearance:
+    def learned(
+        self, image: Image, camera: Camera, ball: Expected, found: Centre, others: Sequence[Light] = ()
+    ) -> Appearance:
         """Return what is known after one more ball.
 
         Args:
             image: the camera's, BGR.
             ball, found: what was expected of the ball and what its fit gave.
+            others: what other cameras learned of the room's light.
         """
         if found.misfit > MISFIT_MAX:
             return self
@@ -70,10 +74,11 @@ class Appearance:
         detail = response.detail + DETAIL_SHARE * (detail_of(image, extent) - response.detail)
         response = replace(response, detail=detail)
         R_RtoW = ray_frame(*_ray(ball, camera), camera.R_CtoW)
-        equations = light_on(sample, self.light.lamp_seen(R_RtoW))
-        light = self.light if equations is None else self.light.learned(*equations, R_RtoW)
-        shown = light if _due(light.count) and light.trusted else self.shown
-        return Appearance(response, light, shown)
+        light = self.light.learned(*light_on(sample, self.light.lamp_seen(R_RtoW)), R_RtoW)
+        if not (light.trusted and _due(light.count)):
+            return Appearance(response, light, self.shown)
+        light = light.solved(others)
+        return Appearance(response, light, light)
 
 
 def _due(balls: int) -> bool:

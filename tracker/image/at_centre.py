@@ -30,7 +30,9 @@ def _fit_at(
 def slopes_at(
     pixels: Array, fine: NDArray[np.float32], made: Array, ball: Array, variance: int, u: float, v: float, slopes: Array
 ) -> float:
-    """Fill in the slopes (2, n) of the first channel, as fitted at a centre (u, v), by that centre [1/px].
+    """Fill in the slopes (3, n) of the first channel, as fitted at a centre (u, v).
+
+    By that centre [1/px] and by the blur's variance [1/px^2].
 
     Returns the slope by the blur's variance of half the sum of squares that the fit leaves in all channels [1/px^2]:
     positive when a sharper ball would fit better.
@@ -48,6 +50,7 @@ def slopes_at(
         for i in range(n):
             total -= weight[i] * rest[i] * bend[i]
     room = pixels[LUMA + channels]
+    slope_of(pixels, room, drawn[m + 2 * p :], coefficients[0], slopes[2])
     slope_of(pixels, room, drawn[m : m + p], coefficients[0], slopes[0])
     slope_of(pixels, room, drawn[m + p : m + 2 * p], coefficients[0], slopes[1])
     return total

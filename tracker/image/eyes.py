@@ -160,7 +160,8 @@ class Eyes:
             one, index = look.fitted(sighting), sighting.camera
             camera, image = self._rig.cameras[index], one.frame.image
             expected = one.expected(camera, self._behind[index].room)
-            self._rivals[index] = self._rivals[index].learned(image, camera, expected, one.centre)
+            others = [rivals for other, rivals in enumerate(self._rivals) if other != index]
+            self._rivals[index] = self._rivals[index].learned(image, camera, expected, one.centre, others)
             if one.streak_px < SMEARED * expected.radius_px:
                 self._mounting.learn(image, expected, one.sighting.ball, one.centre, camera.R_CtoW.T @ state.R_BtoW)
         self._sum_up()

@@ -1,42 +1,47 @@
 """The room's light, learned from the balls it falls on.
 
 All balls are matt, of one paint each, and far smaller than the room: the brightness of a ball at a point with normal
-n is its paint times one function of n in the room, E(n) = e + a.n + max(0, n.L): even light, light that comes from
-one side, and a lamp. It is learned from the balls' own images; afterwards a ball's image is known up to two factors,
-and the shaded limb no longer pulls its centre towards the lamp.
+n is its paint times one function of n, E(n), whatever lamps, windows and walls there are: a sum of a few harmonics
+(`tracker/image/harmonics.py`), with lamps behind them (`tracker/image/lamps.py`). It is learned from the balls' own
+images; afterwards a ball's image is known up to two factors, and the shaded limb no longer pulls its centre towards
+the lamp.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tracker.image.template import GLOSS, TERMS, Shades, Vector
+from tracker.image.harmonics import TERMS, turned
+from tracker.image.lamps import explained
+from tracker.image.template import GLOSS, Shades, Vector
 from tracker.maths.compiled import compiled
-from tracker.maths.solve import cholesky, dot, solve
+from tracker.maths.solve import dot
 from tracker.types import Array
 
 FORGETTING = 0.99  # a ball: the light of about the last hundred counts
 FADED = 0.2  # what is left of what was learned under another gamma
 ENOUGH = 3  # balls until the light is trusted
-RIDGE = np.array([0.0, 0.05, 0.05, 0.05, 0.002, 0.002, 0.002])  # a lamp explains what it can, one-sided light the rest
-LAMP_STEPS = 32  # directions and weights are rounded to 1 / LAMP_STEPS, so that templates can be kept
+STEPS = (
+    512  # weights are rounded to 1 / STEPS, and the lamp's direction to 1 / LAMP_STEPS, so that templates serve again
+)
+LAMP_STEPS = 32
 COVERAGE = (1.0,) + (0.0,) * TERMS
 MIRROR = (0.0,) * GLOSS + (1.0,)
-_UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Light:
     """What is known of the light.
 
-    lamp: (3,) unit vector to the lamp in W.  terms: (TERMS,) of E in W, relative to its mean over a disc.
-    information (TERMS, TERMS), target (TERMS,): normal equations of what was learned.  count: balls learned.
+    lamp: (3,) unit vector to the brightest lamp in W.  terms: (TERMS,) of E in W, the even light 1.
+    information (TERMS, TERMS), target (TERMS,): normal equations of what one camera's balls taught.  count: balls.
     """
 
-    lamp: Array = field(default_factory=lambda: _UP)
+    lamp: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     terms: Array = field(default_factory=lambda: np.eye(TERMS)[0])
     information: Array = field(default_factory=lambda: np.zeros((TERMS, TERMS)))
     target: Array = field(default_factory=lambda: np.zeros(TERMS))
@@ -48,59 +53,70 @@ class Light:
         return self.count >= ENOUGH
 
     def learned(self, information: Array, target: Array, R_RtoW: Array) -> Light:
-        """Return the light with one more ball in it.
+        """Return it with what one more ball teaches; the same when the ball has no brightness of its own.
 
         Args:
-            information (TERMS, TERMS), target (TERMS,): normal equations of the terms in the ball's ray frame, with
-                the lamp of `lamp_seen`, scaled to mean brightness 1.
+            information (TERMS, TERMS), target (TERMS,): normal equations of the terms in the ball's ray frame, times
+                the brightness of its paint.
             R_RtoW: (3, 3) turns the ray's frame into the room.
         """
-        after, aim, lamp = self.information.copy(), self.target.copy(), self.lamp.copy()
-        terms = _with_one_more(after, aim, information, target, R_RtoW, lamp)
-        return Light(lamp, terms, after, aim, self.count + 1)
+        turn, after, aim = turned(R_RtoW), self.information.copy(), self.target.copy()
+        kept = min(FORGETTING, 1.0 - 1.0 / (self.count + 2.0))  # the first are learned before blur and light are known
+        if not _add(after, aim, turn @ information @ turn.T, turn @ target, self.terms, kept):
+            return self
+        return replace(self, information=after, target=aim, count=self.count + 1)
+
+    def solved(self, others: Iterable[Light]) -> Light:
+        """Return it with the lamps that explain best what this camera's balls and those of others show."""
+        information, target = self.information.copy(), self.target.copy()
+        for other in others:
+            information += other.information
+            target += other.target
+        try:
+            terms, lamp = explained(information, target)
+        except RuntimeError:  # the search for lamps did not end: the light known before serves on
+            return self
+        return replace(self, lamp=lamp, terms=terms)
 
     def faded(self) -> Light:
         """Return the same light, less sure of it."""
         return replace(self, information=FADED * self.information, target=FADED * self.target)
 
     def lamp_seen(self, R_RtoW: Array) -> Vector:
-        """Return the lamp's direction in a ray's frame, rounded."""
-        return _rounded(R_RtoW, self.lamp)
+        """Return the brightest lamp's direction in a ray's frame, rounded."""
+        x, y, z = _rounded(R_RtoW.T @ self.lamp, LAMP_STEPS)
+        return x, y, z
 
     def shades(self, R_RtoW: Array) -> Shades:
         """Return the shapes of a ball seen along a ray: coverage, that times the light, the lamp's mirror image."""
-        weights = np.concatenate((self.terms[:1], R_RtoW.T @ self.terms[1:4], R_RtoW.T @ self.terms[4:7]))
-        rounded = np.round(weights / weights[0] * LAMP_STEPS) / LAMP_STEPS
-        matt = (*(float(w) for w in rounded), 0.0)
+        matt = (*_rounded(turned(R_RtoW).T @ self.terms, STEPS), 0.0)
         return Shades(self.lamp_seen(R_RtoW), (COVERAGE, matt, MIRROR))
 
 
-@compiled("UniTuple(f8, 3)(f8[:, ::1], f8[::1])")
-def _rounded(R_RtoW: Array, lamp: Array) -> Vector:
-    """Return what `Light.lamp_seen` does."""
-    x = y = z = 0.0
-    for i in range(3):
-        x, y, z = x + R_RtoW[i, 0] * lamp[i], y + R_RtoW[i, 1] * lamp[i], z + R_RtoW[i, 2] * lamp[i]
-    return round(x * LAMP_STEPS) / LAMP_STEPS, round(y * LAMP_STEPS) / LAMP_STEPS, round(z * LAMP_STEPS) / LAMP_STEPS
+def _rounded(values: Array, steps: int) -> list[float]:
+    rounded: list[float] = (np.round(values * steps) / steps).tolist()
+    return rounded
 
 
-@compiled("f8[::1](f8[:, ::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[::1])")
-def _with_one_more(information: Array, target: Array, more: Array, aim: Array, R_RtoW: Array, lamp: Array) -> Array:
-    """Add one ball's normal equations, turned into the room, and turn the lamp, in place; return the terms."""
-    turn = np.eye(TERMS)
-    turn[1:4, 1:4] = R_RtoW
-    turn[4:7, 4:7] = R_RtoW
-    information[:] = FORGETTING * information + turn @ more @ turn.T
-    target[:] = FORGETTING * target + turn @ aim
-    factor, terms = information.copy(), target.copy()
+@compiled("b1(f8[:, ::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8)")
+def _add(information: Array, target: Array, more: Array, aim: Array, terms: Array, kept: float) -> bool:
+    """Keep so much and add one ball's normal equations in the room, in place; False if it has no brightness.
+
+    How bright its paint is in this light is the ball's own, and is taken out: to give every ball the same mean would
+    say that no side of the room is brighter, and what is left for the light to follow looks like a centre pulled aside.
+    Source: pixels are s T e with paint s and terms e, linearised about today's e and the s that fits it best.
+    """
+    shown = more @ terms
+    squares, seen = dot(terms, shown), dot(terms, aim)
+    if not (squares > 0.0 and seen > 0.0):
+        return False
+    paint = seen / squares
     for i in range(TERMS):
-        factor[i, i] += RIDGE[i] * information[0, 0] + 1e-9
-    cholesky(factor)
-    solve(factor, terms)
-    length, pull = math.sqrt(dot(terms[4:7], terms[4:7])), dot(terms[1:4] + terms[4:7], terms[4:7])
-    if length > 0.0 and pull > 0.0:
-        lamp[:] = terms[4:7] / length
-    return terms
+        target[i] = kept * target[i] + paint * (aim[i] - paint * shown[i])
+        for j in range(TERMS):
+            apart = paint * paint * (more[i, j] - shown[i] * shown[j] / squares)
+            information[i, j] = kept * information[i, j] + apart
+    return True
 
 
 @compiled("f8[:, ::1](f8, f8, Array(f8, 2, 'A', readonly=True))")

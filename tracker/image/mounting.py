@@ -19,6 +19,7 @@ from tracker.image.reading import LUMA_VAR
 from tracker.image.robust import without_strangers
 from tracker.image.view import RAY_X, RAY_Y
 from tracker.maths.compiled import compiled
+from tracker.maths.sphere import spread
 from tracker.rig import Marker
 from tracker.types import Array, Image
 
@@ -37,16 +38,7 @@ D_X, D_Y, D_Z, STRANGE, THING = range(5)
 """Of a thing about a ball: a unit vector in B from the ball's centre, and by how much more than elsewhere its pixels
 leave, squared; 0 for nothing."""
 
-
-def _sphere() -> Array:
-    """Return unit vectors (DIRECTIONS, 3). Source: the golden spiral, Vogel, Mathematical Biosciences 44 (1979)."""
-    k = np.arange(DIRECTIONS) + 0.5
-    z, turn = 1.0 - 2.0 * k / DIRECTIONS, math.pi * (1.0 + math.sqrt(5.0)) * k
-    level = np.sqrt(1.0 - z * z)
-    return np.stack((level * np.cos(turn), level * np.sin(turn), z), axis=1)
-
-
-SPHERE = _sphere()
+SPHERE = spread(DIRECTIONS)
 
 
 class Mounting:

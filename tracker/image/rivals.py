@@ -18,6 +18,7 @@ import numpy as np
 from tracker.camera import Camera
 from tracker.image.appearance import MISFIT_MAX, Appearance
 from tracker.image.centre import Centre, fit_centre
+from tracker.image.light import Light
 from tracker.image.patch import Expected, Response, behind_is_known
 from tracker.types import Array, Image
 
@@ -71,16 +72,22 @@ class Rivals:
         """Say whether the search is over."""
         return len(self.appearances) == 1
 
-    def learned(self, image: Image, camera: Camera, ball: Expected, found: Centre) -> Rivals:
-        """Return the rivals after one more ball; arguments as for `Appearance.learned`."""
+    def under(self, gamma: float) -> Appearance:
+        """Return the appearance of the gamma nearest to that."""
+        return min(self.appearances, key=lambda one: abs(one.response.gamma - gamma))
+
+    def learned(
+        self, image: Image, camera: Camera, ball: Expected, found: Centre, others: Sequence[Rivals] = ()
+    ) -> Rivals:
+        """Return the rivals after one more ball; arguments as for `Appearance.learned`, others of other cameras."""
         if found.misfit > MISFIT_MAX:
             return self
         if self.settled and not self.by_room and behind_is_known(ball):
-            return _around(self.best, APART, self.pull_px, by_room=True).learned(image, camera, ball, found)
+            return _around(self.best, APART, self.pull_px, by_room=True).learned(image, camera, ball, found, others)
         if self.settled:
             if ball.response.gamma != self.best.response.gamma:
                 return self  # looked at before this gamma was found
-            one = self.best.learned(image, camera, ball, found)
+            one = self.best.learned(image, camera, ball, found, _lights(others, self.best))
             return replace(self, appearances=(one,), count=self.count + 1)
         if self.by_room and not behind_is_known(ball):
             return self
@@ -91,7 +98,7 @@ class Rivals:
             fit = fit_centre(image, own)
             if not isinstance(fit, Centre):
                 return self
-            appearances.append(rival.learned(image, camera, own, fit))
+            appearances.append(rival.learned(image, camera, own, fit, _lights(others, rival)))
             centres.append(fit.uv_px)
             misfits.append(misfit + share * (float(np.log(fit.misfit)) - misfit))
         apart = appearances[-1].response.gamma - appearances[0].response.gamma
@@ -112,6 +119,11 @@ class Rivals:
             return _around(best, BEYOND, self.pull_px, by_room=self.by_room)
         gamma, doubt = _lowest_point(gammas, self.misfits)
         return Rivals((best.with_gamma(gamma),), (0.0,), 0, self.pull_px, self.by_room, doubt)
+
+
+def _lights(others: Sequence[Rivals], rival: Appearance) -> list[Light]:
+    """Return what other cameras know of the light under a gamma such as a rival's: another would mislead it."""
+    return [other.under(rival.response.gamma).light for other in others]
 
 
 def _lowest_point(gammas: Sequence[float], misfits: Sequence[float]) -> tuple[float, float]:

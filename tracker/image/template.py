@@ -2,9 +2,9 @@
 
 Seen from afar a matt sphere of image radius r is a disc whose brightness depends on its normal alone,
 n = (x, y, z) with x right, y down in units of r and z = sqrt(1 - x^2 - y^2) towards the camera. Its image is a sum of
-seven matt terms: 1, n, and n where the lamp reaches it (Lambert's law: max(0, n.L) = n.L there, 0 elsewhere), and of
-the paint's gloss: the lamp's mirror image, so small that its place tells all. Lens and pixel blur each. Drawn once per
-rounded radius, blur and light on a fine grid, the image at any sub-pixel place is a slice (`tracker/image/reading.py`).
+matt terms, functions of n (`tracker/image/harmonics.py`), and of the paint's gloss: the lamp's mirror image, so small
+that its place tells all. Lens and pixel blur each. Drawn once per rounded radius, blur and light on a fine grid, the
+image at any sub-pixel place is a slice (`tracker/image/reading.py`).
 """
 
 from __future__ import annotations
@@ -18,11 +18,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.image.harmonics import TERMS, lit
 from tracker.maths.compiled import compiled
 from tracker.types import Array
 
-TERMS = 7
-"""1, x, y, z, and x, y, z again where the lamp shines."""
 GLOSS = TERMS
 """The term after those: the lamp's mirror image."""
 GLOSS_SQUARINGS = 5  # an exponent of 32, about that of satin paint; Blinn, "Models of light reflection", SIGGRAPH 1977
@@ -41,7 +40,8 @@ Streak = tuple[float, float]
 class Shades:
     """How a ball is shaded, in the frame of its ray (x right, y down, z towards the camera).
 
-    lamp: unit vector to the lamp.  weights: for each shape those of its terms; the first shape is the coverage.
+    lamp: unit vector to where most light comes from.
+    weights: for each shape those of its terms; the first shape is the coverage.
     """
 
     lamp: Vector
@@ -51,11 +51,13 @@ class Shades:
 _UNITS = tuple(tuple(float(i == j) for j in range(TERMS + 1)) for i in range(TERMS + 1))
 FLAT = Shades((0.0, 0.0, 1.0), _UNITS[:4])
 """A matt ball under light not known: even, and linear in the normal."""
+EVERY_TERM = Shades((0.0, 0.0, 1.0), _UNITS[:TERMS])
+"""Its shapes are the matt terms themselves."""
 
 
-def every_term(lamp: Vector) -> Shades:
-    """Return the shades whose shapes are the terms themselves."""
-    return Shades(lamp, _UNITS)
+def mirrored(lamp: Vector) -> Shades:
+    """Return the shades whose only shape is a lamp's mirror image."""
+    return Shades(lamp, _UNITS[GLOSS:])
 
 
 class Template(NamedTuple):  # spread out into compiled calls
@@ -92,12 +94,12 @@ def variance_of(blur_px: float, box_px: int) -> float:
     return blur_px * blur_px + box_px * box_px / 12.0
 
 
-@compiled("void(f4, f4, f4, f4[::1], f4[::1], f4[:, ::1], f4[::1])")
-def _terms_along(
-    y: np.float32, step: np.float32, first: np.float32, lamp: NDArray[np.float32], half: NDArray[np.float32],
-    terms: NDArray[np.float32], disc: NDArray[np.float32],
+@compiled("void(f4, f4, f4, f4[::1], f4[:, ::1], f4[::1], f4[::1])")
+def _surface_along(
+    y: np.float32, step: np.float32, first: np.float32, half: NDArray[np.float32], normals: NDArray[np.float32],
+    gloss: NDArray[np.float32], disc: NDArray[np.float32],
 ) -> None:  # fmt: skip
-    """Fill in the terms (TERMS + 1, n) along a row of a sphere's image, and how much of each sample is disc (n,).
+    """Fill in normals (3, n) along a row of a sphere's image, its gloss (n,) and how much of each sample is disc (n,).
 
     y, step, first: the row, the grid's step and the first sample's x, in radii.  half: midway between lamp and camera.
     """
@@ -108,13 +110,11 @@ def _terms_along(
         disc[i] = max(zero, min((one - distance) / step + np.float32(0.5), one))
         shrink = one / max(one, distance)
         n_x, n_y, n_z = x * shrink, y * shrink, np.sqrt(max(zero, one - distance * distance))
-        lit = min(one, max(zero, (lamp[0] * n_x + lamp[1] * n_y + lamp[2] * n_z) / step + np.float32(0.5)))
-        terms[0, i], terms[1, i], terms[2, i], terms[3, i] = one, n_x, n_y, n_z
-        terms[4, i], terms[5, i], terms[6, i] = n_x * lit, n_y * lit, n_z * lit
-        gloss = max(half[0] * n_x + half[1] * n_y + half[2] * n_z, zero)
+        normals[0, i], normals[1, i], normals[2, i] = n_x, n_y, n_z
+        mirrored = max(half[0] * n_x + half[1] * n_y + half[2] * n_z, zero)
         for _ in range(GLOSS_SQUARINGS):
-            gloss *= gloss
-        terms[GLOSS, i] = gloss
+            mirrored *= mirrored
+        gloss[i] = mirrored
 
 
 @compiled("f4[:, :, ::1](i8, f8, i8, f4[::1], f4[:, ::1])")
@@ -128,22 +128,18 @@ def _sharp(
     half /= max(np.sqrt((half * half).sum()), np.float32(1e-3))
     rim = min(count, int(np.ceil(radius_px * per_px)) + 1)
     width = 2 * rim + 1
-    terms, disc, line = (
-        np.empty((TERMS + 1, width), np.float32),
-        np.empty(width, np.float32),
-        np.empty(width, np.float32),
-    )
+    normals, rows = np.empty((3, width), np.float32), np.empty((3, width), np.float32)
+    gloss, disc, line = rows[0], rows[1], rows[2]
     for row in range(count - rim, count + rim + 1):
-        _terms_along(np.float32(row - count) * step, step, np.float32(-rim) * step, lamp, half, terms, disc)
+        _surface_along(np.float32(row - count) * step, step, np.float32(-rim) * step, half, normals, gloss, disc)
         for k in range(len(weights)):
-            line[:] = np.float32(0.0)
-            for t in range(TERMS + 1):
-                weight = weights[k, t]
-                if weight != 0.0:
-                    for i in range(width):
-                        line[i] += weight * terms[t, i]
+            if weights[k, 1:GLOSS].any():
+                lit(weights[k, :GLOSS], normals, line)
+            else:
+                line[:] = weights[k, 0]
+            shine = weights[k, GLOSS]
             for i in range(width):
-                shapes[row, count - rim + i, k] = line[i] * disc[i]
+                shapes[row, count - rim + i, k] = (line[i] + shine * gloss[i]) * disc[i]
     return shapes
 
 

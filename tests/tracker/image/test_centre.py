@@ -60,7 +60,7 @@ def accustomed(radius_px: float, paint: Paint = picture) -> Appearance:
 
 
 @pytest.mark.parametrize("radius_px", [2.2, 2.8, 4.0, 6.5])
-def test_a_ball_is_found_to_a_thirtieth_of_a_pixel_once_the_light_is_known(radius_px: float) -> None:
+def test_a_ball_is_found_to_a_fortieth_of_a_pixel_once_the_light_is_known(radius_px: float) -> None:
     """Root mean square on each axis, at noise of one grey level, however rough the start."""
     rng, known = np.random.default_rng(3), accustomed(radius_px)
     errors = []
@@ -71,7 +71,7 @@ def test_a_ball_is_found_to_a_thirtieth_of_a_pixel_once_the_light_is_known(radiu
         found = fit_centre(picture(uv_px, radius_px, noise=(1.0, rng)), what)
         assert isinstance(found, Centre)
         errors.append(found.uv_px - uv_px)
-    assert np.sqrt(np.mean(np.square(errors), axis=0)).max() < 1.0 / 30.0
+    assert np.sqrt(np.mean(np.square(errors), axis=0)).max() < 1.0 / 40.0
 
 
 def on_a_stand(uv_px: Array, radius_px: float, noise: Noise) -> Image:
@@ -163,11 +163,17 @@ def test_errors_are_of_the_size_that_the_covariance_says() -> None:
     assert 2.0 / 3.0 < np.mean(nees) < 6.0
 
 
-@pytest.mark.parametrize(("half_px", "bgr"), [(0.7, TUBE_BGR), (8.0, SKIN_BGR)], ids=["tube", "hand"])
-def test_a_ball_partly_hidden_is_within_five_sigma(half_px: float, bgr: Array) -> None:
-    """Beside 0.02 px, which a camera's noise is never less than; 28.7 is chi-square's for two errors."""
+@pytest.mark.parametrize(
+    ("half_px", "bgr", "beyond"), [(0.7, TUBE_BGR, 0.0), (8.0, SKIN_BGR, 0.01)], ids=["tube", "hand"]
+)
+def test_a_ball_partly_hidden_is_within_five_sigma(half_px: float, bgr: Array, beyond: float) -> None:
+    """All behind a tube, and all but one in a hundred behind a hand, whose edge a ball's own may be taken for.
+
+    Beside 0.02 px, which a camera's noise is never less than; 28.7 is chi-square's for two errors.
+    """
     rng, known = np.random.default_rng(7), accustomed(RADIUS_PX)
-    for _ in range(60):
+    squares = []
+    for _ in range(300):
         uv_px = rng.uniform((200, 200), (400, 300))
         canvas = empty_canvas(CAMERA)
         draw_ball(canvas, uv_px, RADIUS_PX, BALL)
@@ -177,7 +183,9 @@ def test_a_ball_partly_hidden_is_within_five_sigma(half_px: float, bgr: Array) -
         found = fit_centre(developed(canvas, (1.0, rng)), known.expected_like(expected(uv_px), CAMERA, uv_px))
         if isinstance(found, Centre):
             error = found.uv_px - uv_px
-            assert error @ np.linalg.solve(found.cov_px + 0.02**2 * np.eye(2), error) < 28.7
+            squares.append(error @ np.linalg.solve(found.cov_px + 0.02**2 * np.eye(2), error))
+    assert len(squares) > 100
+    assert np.mean(np.array(squares) > 28.7) <= beyond
 
 
 def test_a_ball_that_drowns_in_noise_is_within_five_sigma_or_none() -> None:

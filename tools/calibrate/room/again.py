@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 
 import numpy as np
 
@@ -51,22 +52,14 @@ class Again:
         known = self.known()
         return known[:: max(1, len(known) // LESSONS)]
 
-    def taught(self) -> Rivals:
-        """Learn how this camera shows balls."""
-        return self._learned(first_rivals(), self.lessons())
-
-    def taught_anew(self, known: Appearance) -> Appearance:
-        """Learn light anew under a gamma that is known; half of the images do for that."""
-        return self._learned(settled_on(known), self.lessons()[::2]).best
-
-    def _learned(self, rivals: Rivals, lessons: Sequence[int]) -> Rivals:
-        for k in (k for sweep in range(SWEEPS) for k in lessons[sweep::SWEEPS]):
-            image = self.image(k)
-            for ball in range(len(self.rig.marker)):
-                expected = self.expected(rivals, k, ball)
-                found = fit_centre(image, expected)
-                if isinstance(found, Centre):
-                    rivals = rivals.learned(image, self.rig.cameras[self.camera], expected, found)
+    def lesson(self, rivals: Rivals, k: int, others: Sequence[Rivals]) -> Rivals:
+        """Learn from all balls of one image; others: what other cameras know of the room's light."""
+        image = self.image(k)
+        for ball in range(len(self.rig.marker)):
+            expected = self.expected(rivals, k, ball)
+            found = fit_centre(image, expected)
+            if isinstance(found, Centre):
+                rivals = rivals.learned(image, self.rig.cameras[self.camera], expected, found, others)
         return rivals
 
     def expected(self, rivals: Rivals, k: int, ball: int) -> Expected:
@@ -91,6 +84,27 @@ class Again:
         """Return an image."""
         camera = self.rig.cameras[self.camera]
         return self.clips[k].frame(camera.width_px, camera.height_px).image
+
+
+def taught(cameras: Sequence[Again]) -> list[Rivals]:
+    """Learn how each camera shows balls, all in the light of one room."""
+    return _together(cameras, [first_rivals() for _ in cameras], [camera.lessons() for camera in cameras])
+
+
+def taught_anew(cameras: Sequence[Again], known: Sequence[Appearance]) -> list[Appearance]:
+    """Learn light anew under gammas that are known; half of the images do for that."""
+    lessons = [camera.lessons()[::2] for camera in cameras]
+    return [rivals.best for rivals in _together(cameras, [settled_on(one) for one in known], lessons)]
+
+
+def _together(cameras: Sequence[Again], rivals: list[Rivals], lessons: Sequence[Sequence[int]]) -> list[Rivals]:
+    """Let cameras learn in turn, so that each has what the others know of the light."""
+    for sweep in range(SWEEPS):
+        for images in zip_longest(*(each[sweep::SWEEPS] for each in lessons)):
+            for c, k in enumerate(images):
+                if k is not None:
+                    rivals[c] = cameras[c].lesson(rivals[c], k, rivals[:c] + rivals[c + 1 :])
+    return rivals
 
 
 def again(footage: Footage, rig: Rig) -> tuple[Again, ...]:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from tools.calibrate.room.again import Again, again
+from tools.calibrate.room.again import Again, again, taught
 from tools.calibrate.room.balls import sigma_px
 from tools.calibrate.room.encoding import NOTHING, Encoding, fitted
 from tools.calibrate.room.footage import Footage
@@ -29,13 +29,14 @@ def looked_again(footage: Footage, rig: Rig) -> tuple[Track, ...]:
     Returns:
         Each camera's track of what two cameras saw together; times count from footage.start_ns by the rig's clocks.
     """
-    return tuple(track_of(_measured(camera), len(rig.marker)) for camera in again(footage, rig))
+    cameras = again(footage, rig)
+    rivals = taught(cameras)
+    encodings = learned(cameras, rivals)
+    return tuple(track_of(_measured(*each), len(rig.marker)) for each in zip(cameras, rivals, encodings, strict=True))
 
 
-def _measured(camera: Again) -> Iterator[tuple[float, Array]]:
+def _measured(camera: Again, rivals: Rivals, encoding: Encoding | None) -> Iterator[tuple[float, Array]]:
     """Yield the stamps and centres of a camera's images, fitted once it is known how it shows balls."""
-    rivals = camera.taught()
-    encoding = learned(camera, rivals)
     if encoding is not None:
         rivals = settled_on(encoding.appearance)
     for k in camera.known():

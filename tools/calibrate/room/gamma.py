@@ -6,15 +6,15 @@ Sightings whose own unknowns are eliminated leave normal equations of what they 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from tools.calibrate.room.again import Again
+from tools.calibrate.room.again import Again, taught_anew
 from tools.calibrate.room.encoded import SHARED
 from tools.calibrate.room.encoding import Encoding, fitted
-from tracker.image.appearance import MISFIT_MAX
+from tracker.image.appearance import MISFIT_MAX, Appearance
 from tracker.image.centre import Centre, fit_centre
 from tracker.image.lesson import BLUR_MAX_PX
 from tracker.image.patch import light_of
@@ -32,40 +32,63 @@ ENOUGH = 30  # sightings
 LEAST_PAINT, RIDGE = 1e-3, 1e-6
 
 
-def learned(camera: Again, rivals: Rivals) -> Encoding | None:
-    """Learn how a camera encodes light, None where it keeps colour by the pixel, or too little was seen.
+def learned(cameras: Sequence[Again], rivals: Sequence[Rivals]) -> list[Encoding | None]:
+    """Learn how cameras encode light; None where one keeps colour by the pixel, or too little was seen.
 
-    rivals: what `camera.taught` gave.
+    rivals: what `taught` gave.
     Light learned under a wrong gamma hides most of the error: the same sightings then tell a gamma between the wrong
-    and the right one. The right one is told again under its own light, and is found by a secant.
+    and the right one. The right one is told again under its own light, and is found by a secant; all cameras go
+    together, since they see one light.
     """
-    response, under = rivals.best.response, rivals.best.response.gamma
-    if response.block_px == 1 or not rivals.best.shown.trusted:
+    shown = [one.best for one in rivals]
+    under = [one.response.gamma for one in shown]
+    told = _each(lambda c: _first(cameras[c], shown[c]), range(len(cameras)))
+    first = {c: one for c, one in told.items() if abs(one.gamma - under[c]) >= ALIKE}
+    far = {c: _within(under[c] + FURTHER * (one.gamma - under[c])) for c, one in first.items()}
+    second = _told_under(cameras, shown, first, far)
+    right = {c: _secant(under[c], first[c].gamma, far[c], one.gamma) for c, one in second.items()}
+    third = _told_under(cameras, shown, second, right)
+    return [third.get(c) if c in first else told.get(c) for c in range(len(cameras))]
+
+
+def _each(tell: Callable[[int], Encoding | None], cameras: Iterable[int]) -> dict[int, Encoding]:
+    """Return what is told of each camera of which something is."""
+    return {c: one for c in cameras if (one := tell(c)) is not None}
+
+
+def _first(camera: Again, shown: Appearance) -> Encoding | None:
+    """Return what all sightings tell in the light that was learned as the tracker learns it."""
+    if shown.response.block_px == 1 or not shown.shown.trusted:
         return None
-    smoothing = SMOOTHED if response.detail > SMOOTH_DETAIL else 0.0
-    first = _told(camera, Encoding(rivals.best, smoothing, _first_paints(camera, rivals)))
-    if first is None or abs(first.gamma - under) < ALIKE:
-        return first
-    far = _within(under + FURTHER * (first.gamma - under))
-    second = _told_under(camera, first, far)
-    if second is None:
-        return None
-    less = (first.gamma - under) - (second.gamma - far)
-    share = (first.gamma - under) / less if less * (far - under) > 0.0 else 1.0
-    return _told_under(camera, second, _within(under + share * (far - under)))
+    smoothing = SMOOTHED if shown.response.detail > SMOOTH_DETAIL else 0.0
+    return _told(camera, Encoding(shown, smoothing, _first_paints(camera, shown.response.gamma)))
+
+
+def _secant(under: float, told: float, far: float, told_far: float) -> float:
+    """Return the gamma that would be told under its own light."""
+    less = (told - under) - (told_far - far)
+    return _within(under + ((told - under) / less if less * (far - under) > 0.0 else 1.0) * (far - under))
 
 
 def _within(gamma: float) -> float:
     return min(MOST_GAMMA, max(LEAST_GAMMA, gamma))
 
 
-def _told_under(camera: Again, known: Encoding, gamma: float) -> Encoding | None:
-    """Learn light anew under a gamma, then let all sightings tell gamma, blur and paints."""
-    then = known.appearance.with_gamma(gamma)
-    light = camera.taught_anew(then)
-    response = replace(light.response, luma_px=known.appearance.response.luma_px)
-    paints = np.maximum(known.paints, LEAST_PAINT) ** (gamma / known.gamma)  # of the same grey levels
-    return _told(camera, Encoding(replace(light, response=response), known.smoothing, _unit(paints)))
+def _told_under(
+    cameras: Sequence[Again], shown: Sequence[Appearance], known: Mapping[int, Encoding], gammas: Mapping[int, float]
+) -> dict[int, Encoding]:
+    """Learn light anew, some cameras' under a gamma of theirs, then let all sightings tell gamma, blur and paints."""
+    if not gammas:
+        return {}
+    stand = [known[c].appearance.with_gamma(gammas[c]) if c in gammas else one for c, one in enumerate(shown)]
+    light = taught_anew(cameras, stand)
+
+    def under(c: int) -> Encoding | None:
+        response = replace(light[c].response, luma_px=known[c].appearance.response.luma_px)
+        paints = np.maximum(known[c].paints, LEAST_PAINT) ** (gammas[c] / known[c].gamma)  # of the same grey levels
+        return _told(cameras[c], Encoding(replace(light[c], response=response), known[c].smoothing, _unit(paints)))
+
+    return _each(under, gammas)
 
 
 def _told(camera: Again, known: Encoding) -> Encoding | None:
@@ -88,9 +111,9 @@ def _sightings(camera: Again) -> list[int]:
     return known[:: max(1, len(known) * len(camera.rig.marker) // SIGHTINGS)]
 
 
-def _first_paints(camera: Again, rivals: Rivals) -> Array:
+def _first_paints(camera: Again, gamma: float) -> Array:
     """Return about what light each ball sends, by the middles of its images."""
-    light = light_of(rivals.best.response.gamma)
+    light = light_of(gamma)
     paints = np.zeros((len(camera.rig.marker), 3))
     for k in _sightings(camera):
         image = camera.image(k)

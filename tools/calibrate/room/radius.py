@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tools.calibrate.room.again import Again, again
+from tools.calibrate.room.again import Again, again, taught
 from tools.calibrate.room.footage import Footage
 from tracker.image.appearance import MISFIT_MAX
 from tracker.image.centre import Centre, fit_centre, misfit_at
@@ -99,8 +99,8 @@ def _parabolas(cameras: Sequence[Again]) -> tuple[Array, Array, bool]:
     balls = len(cameras[0].rig.marker)
     size = balls + len(cameras)
     N, g, by_block = np.zeros((STRETCHES, size, size)), np.zeros((STRETCHES, size)), False
-    for each in cameras:
-        rivals, lessons = each.taught(), each.lessons()
+    for each, rivals in zip(cameras, taught(cameras), strict=True):
+        lessons = each.lessons()
         by_block = by_block or rivals.best.response.block_px > 1
         for n, k in enumerate(lessons):
             image, stretch = each.image(k), STRETCHES * n // len(lessons)

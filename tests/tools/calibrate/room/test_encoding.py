@@ -8,12 +8,13 @@ import pytest
 from tests.tracker.drawing import through_jpeg
 from tests.tracker.paper_rig import paper_rig
 from tools.bench.waved import watched
-from tools.calibrate.room.again import again
+from tools.calibrate.room.again import again, taught
 from tools.calibrate.room.encoded import ALL, BLUR, GAMMA, OWN, PAINT, PLANES, SHAPES, U, V, differentiate
 from tools.calibrate.room.encoding import NOTHING, Encoding, fitted
 from tools.calibrate.room.gamma import SMOOTHED, learned
 from tracker.image.appearance import Appearance
 from tracker.image.centre import numbers_of
+from tracker.image.harmonics import TERMS, terms_at
 from tracker.image.light import Light
 from tracker.image.newton import draw_at, rows_of
 from tracker.image.patch import Expected, Response
@@ -26,7 +27,8 @@ RIG = paper_rig()
 CAMERA = RIG.cameras[0]
 GAMMA_OF_SCREENS = 2.2
 RADIUS_PX, SIZE_PX = 4.0, 48
-LIGHT = Light(terms=np.array([1.0, 0.1, -0.2, 0.3, 0.3, -0.5, 1.2]), count=100)
+LAMP = np.array([0.22, -0.37, 0.9])
+LIGHT = Light(terms=np.where(np.arange(TERMS) < 9, terms_at(LAMP[None])[:, 0], 0.0), count=100)
 KNOWN = Appearance(Response(gamma=GAMMA_OF_SCREENS), LIGHT, LIGHT)
 SHADES = KNOWN.shades(CAMERA, 0.0, 0.0)
 EXPECTED = Expected((SIZE_PX / 2, SIZE_PX / 2), RADIUS_PX, (0.0, 0.0), SHADES, KNOWN.response)
@@ -79,13 +81,13 @@ def test_a_ball_kept_as_jpeg_is_found_to_a_thirtieth_of_a_pixel() -> None:
 @pytest.mark.parametrize("gamma", [1.0, 2.2])
 def test_gamma_is_told_through_jpeg_by_all_sightings_together(gamma: float) -> None:
     _, footage = watched(RIG, 4, Look(jpeg_quality=90, gamma=gamma), 8.0, (0, 0))
-    for camera in again(footage, RIG):
-        told = learned(camera, camera.taught())
+    cameras = again(footage, RIG)
+    for told in learned(cameras, taught(cameras)):
         assert told is not None
         assert told.gamma == pytest.approx(gamma, abs=0.5)
 
 
 def test_a_camera_that_keeps_colour_by_the_pixel_needs_none_of_it() -> None:
     _, footage = watched(RIG, 4, Look(), 5.0, (0, 0))
-    camera = again(footage, RIG)[0]
-    assert learned(camera, camera.taught()) is None
+    cameras = again(footage, RIG)
+    assert learned(cameras, taught(cameras)) == [None, None]
