@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
@@ -56,14 +56,14 @@ class Appearance:
         return replace(ball, uv_px=place, shades=shades, response=self.response, drawn=None)
 
     def learned(
-        self, image: Image, camera: Camera, ball: Expected, found: Centre, others: Sequence[Light] = ()
+        self, image: Image, camera: Camera, ball: Expected, found: Centre, others: Iterable[Light] = ()
     ) -> Appearance:
         """Return what is known after one more ball.
 
         Args:
             image: the camera's, BGR.
             ball, found: what was expected of the ball and what its fit gave.
-            others: what other cameras learned of the room's light.
+            others: what other cameras learned of the room's light, asked for only when it is due.
         """
         if found.misfit > MISFIT_MAX:
             return self

@@ -32,25 +32,23 @@ def slopes_at(
 ) -> float:
     """Fill in the slopes (3, n) of the first channel, as fitted at a centre (u, v).
 
-    By that centre [1/px] and by the blur's variance [1/px^2].
-
+    They are by that centre's u and v [1/px] and by the blur's variance [1/px^2].
     Returns the slope by the blur's variance of half the sum of squares that the fit leaves in all channels [1/px^2]:
     positive when a sharper ball would fit better.
     """
     n, p, channels = pixels.shape[1], fine.shape[2], channels_of(pixels)
     m = p + PLANE
     drawn, seen, coefficients = np.empty((rows_of(p), n)), np.empty((channels, n)), np.empty((channels, m))
-    weight, rest, bend = pixels[TRUST] ** 2, np.empty(n), np.empty(n)
+    weight, rest, others_bend = pixels[TRUST] ** 2, np.empty(n), np.empty(n)
     _fit_at(pixels, fine, made, ball, variance, u, v, weight, drawn, seen, coefficients)
     total = 0.0
     for channel in range(channels):
-        c = coefficients[channel]
+        c, bend = coefficients[channel], slopes[2] if channel == 0 else others_bend
         residual(drawn[:m], c, seen[channel], rest)
         slope_of(pixels, pixels[LUMA + channels + channel], drawn[m + 2 * p :], c, bend)
         for i in range(n):
             total -= weight[i] * rest[i] * bend[i]
     room = pixels[LUMA + channels]
-    slope_of(pixels, room, drawn[m + 2 * p :], coefficients[0], slopes[2])
     slope_of(pixels, room, drawn[m : m + p], coefficients[0], slopes[0])
     slope_of(pixels, room, drawn[m + p : m + 2 * p], coefficients[0], slopes[1])
     return total

@@ -25,7 +25,7 @@ from tracker.types import Array
 FORGETTING = 0.99  # a ball: the light of about the last hundred counts
 FADED = 0.2  # what is left of what was learned under another gamma
 ENOUGH = 3  # balls until the light is trusted
-STEPS, LAMP_STEPS = 512, 32  # to the share of 1 weights and the lamp's direction are rounded: templates serve again
+STEPS, LAMP_STEPS = 512, 32  # how finely 1 is divided where weights, and the lamp's direction, are rounded
 COVERAGE = (1.0,) + (0.0,) * TERMS
 MIRROR = (0.0,) * GLOSS + (1.0,)
 

@@ -10,7 +10,7 @@ the balls may well mislead it; so it begins again, once, when balls pass where t
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -121,9 +121,9 @@ class Rivals:
         return Rivals((best.with_gamma(gamma),), (0.0,), 0, self.pull_px, self.by_room, doubt)
 
 
-def _lights(others: Sequence[Rivals], rival: Appearance) -> list[Light]:
-    """Return what other cameras know of the light under a gamma such as a rival's: another would mislead it."""
-    return [other.under(rival.response.gamma).light for other in others]
+def _lights(others: Sequence[Rivals], rival: Appearance) -> Iterator[Light]:
+    """Yield what other cameras know of the light under a gamma such as a rival's: another would mislead it."""
+    return (other.under(rival.response.gamma).light for other in others)
 
 
 def _lowest_point(gammas: Sequence[float], misfits: Sequence[float]) -> tuple[float, float]:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import tomlkit
 
-from bridge.settings import shipped_configs
+from bridge.settings import config_path
 from tools.calibrate.formats.fields import write_text
 from tools.calibrate.formats.own import camera_table
 from tools.calibrate.room.worth import Worth
@@ -42,7 +42,7 @@ def read_config(config: str) -> str:
     Raises:
         OperatorError: it cannot be read.
     """
-    origin = shipped_configs().get(config, Path(config))
+    origin = config_path(config)
     try:
         return origin.read_text(encoding="utf-8")
     except OSError as error:
