@@ -2,7 +2,8 @@
 
 from bridge.settings.choose_rig import ChosenRig, RigOrigin, marker_of, rig_of
 from bridge.settings.load import config_path, load_settings, shipped_configs
-from bridge.settings.models import LinkSettings, MonitorSettings, PlaceSettings, Settings, TrackerSettings
+from bridge.settings.models import LinkSettings, MonitorSettings, PlaceSettings, Settings
+from bridge.settings.tracking import TrackerSettings
 
 __all__ = [
     "ChosenRig",

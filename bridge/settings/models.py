@@ -24,6 +24,7 @@ from bridge.settings.section import (
     Triple,
     refuse_twins,
 )
+from bridge.settings.tracking import TrackerSettings
 from bridge.settings.vehicle import VehicleSettings
 
 MessageName = Literal["VISION_POSITION_ESTIMATE", "ATT_POS_MOCAP", "VISION_SPEED_ESTIMATE", "ODOMETRY"]
@@ -137,32 +138,6 @@ class MarkerSettings(Section):
                         f"{needed_deg:g} deg; lessen hue_tolerance_deg or repaint one ball"
                     )
         return self
-
-
-class ProcessSettings(Section):
-    """How briskly the vehicle may move: the filter's process noise and its first uncertainty."""
-
-    acceleration_m_s2: Positive = 10.0
-    angular_acceleration_rad_s2: Positive = 40.0
-    manoeuvre_ms: Positive = 400.0
-    initial_speed_m_s: Positive = 2.5
-    initial_rate_rad_s: Positive = 1.6
-    tilt_deg: Positive = 20.0
-    tilt_ms: Positive = 500.0
-
-
-class TrackerSettings(Section):
-    """How sightings become estimates."""
-
-    method: Literal["ekf", "paper"] = "ekf"
-    coast_limit_ms: Positive = 200.0
-    continuity_limit_ms: Positive = 1000.0
-    tilt_limit_deg: Annotated[float, Strict(), Field(gt=0, le=180)] = 60.0
-    sync_window_ms: NotNegative = 4.0
-    gate_probability: Annotated[float, Strict(), Field(gt=0, lt=1)] = 0.999
-    pixel_noise_px: Positive = 0.1
-    clock_offset_sigma_ms: NotNegative = 20.0
-    process: ProcessSettings = ProcessSettings()
 
 
 class MavlinkSettings(Section):

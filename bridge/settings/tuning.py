@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 
-from bridge.settings.models import Settings, TrackerSettings
+from bridge.settings.models import Settings
+from bridge.settings.tracking import TrackerSettings
 from tracker.state import Process
 from tracker.tuning import Tuning
 
