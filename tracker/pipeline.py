@@ -15,11 +15,11 @@ from types import MappingProxyType
 import numpy as np
 
 from tracker.cadence import Cadence
+from tracker.departure import Departure
 from tracker.filter.continuity import Continuity
 from tracker.filter.ekf import Update
 from tracker.filter.history import History
 from tracker.filter.predict import Prediction, first_guess, predict
-from tracker.filter.reported import reported
 from tracker.harvest import Harvest
 from tracker.health.background import LIMIT_PX
 from tracker.health.mend import SHARE
@@ -37,7 +37,6 @@ from tracker.state import OFFSETS, State
 from tracker.study import Round, Study
 from tracker.tuning import Tuning
 from tracker.types import (
-    Estimate,
     Event,
     Frame,
     Reason,
@@ -45,7 +44,6 @@ from tracker.types import (
     Silence,
     Step,
     TrackState,
-    read_only,
 )
 
 POSED = 3  # sightings that make a pose; fewer fit a mistake as well
@@ -67,7 +65,8 @@ class Tracker:
         self._rounds = Rounds(len(rig.cameras), tuning.sync_window_ns)
         self._eyes = Eyes(rig)
         self._study = Study(rig, tuning, self._eyes, stopwatch)
-        self._history = History()
+        self._history = History(tuning.lag_rounds)
+        self._departure = Departure(tuning.lag_rounds, stopwatch)
         self._whole: dict[int, tuple[Frame, list[list[Blob]]]] = {}
         self._track = TrackState.SEARCHING
         self._lights_tried = 0
@@ -77,7 +76,6 @@ class Tracker:
         self._moved_px = np.zeros(len(rig.cameras))
         self._anew = False
         self._seen_ns: dict[tuple[int, int], int] = {}  # by camera and ball
-        self._sent_ns = -(2**63)
 
     def step(self, event: Event) -> Step:
         """Take one event of the source and return what came of it."""
@@ -92,13 +90,18 @@ class Tracker:
         rounds = self._rounds.take(event) if refused is None else []
         harvest = self._work_off(rounds) if rounds else None
         self._watch_the_time(event.t_ns)
+        if self._track is TrackState.LOST and self._departure.is_awaited:
+            harvest = harvest or Harvest(rejections=[] if refused is None else [refused])
+            self._let_go(harvest, all_of_them=True)
         if harvest is None:
             return Step(self._track, rejections=() if refused is None else (refused,))
         return self._step(harvest)
 
     def finish(self) -> Step:
         """Work off the round that was still open when the frames ended."""
-        return self._step(self._work_off(self._rounds.rest()))
+        harvest = self._work_off(self._rounds.rest())
+        self._let_go(harvest, all_of_them=True)
+        return self._step(harvest)
 
     def _work_off(self, rounds: Sequence[Round]) -> Harvest:
         """Take rounds in their order and return what they gave."""
@@ -127,14 +130,15 @@ class Tracker:
         health = self._watch.take(frames, used, refused, state, t_ns)
         if health is not None:
             harvest.health = health
-            self._stand_by(health)
+            self._stand_by(health, harvest)
 
-    def _stand_by(self, health: Health) -> None:
+    def _stand_by(self, health: Health, harvest: Harvest) -> None:
         """Turn each camera that has moved, or moved on, to where the room shows that it looks, and trust it less."""
         for index, camera in enumerate(health.cameras):
             news_px = abs(SHARE * camera.shift_px - float(self._moved_px[index]))
             mended = self._watch.mended(index) if news_px > SHARE * LIMIT_PX else None
             if mended is not None:
+                self._let_go(harvest, all_of_them=True)
                 self._moved_px[index] = SHARE * camera.shift_px
                 cameras = (*self._rig.cameras[:index], mended, *self._rig.cameras[index + 1 :])
                 self._rig = replace(self._rig, cameras=cameras)
@@ -158,13 +162,18 @@ class Tracker:
             few = found is None or 2 * len(found.used) < len(frames) * len(self._rig.marker)
             # The few balls where the track expects them may be something else: look whether the marker is elsewhere.
             found = (self._search(frames, t_ns, harvest) if few else None) or found
-        if found is None or found.state.t_ns <= self._sent_ns:
+        if found is None or not self._departure.is_news(found.state.t_ns):
             return
         available_ns = max([frame.available_ns for frame in frames])
         stages = harvest.stages(started_ns - available_ns, self._stopwatch() - started_ns)
-        self._sent_ns = found.state.t_ns
         self._continuity.went_out(found.state)
-        harvest.estimates.append(self._estimate(found, available_ns, stages))
+        self._departure.take(found.state.t_ns, available_ns, self._track, self._continuity.resets, stages)
+        self._let_go(harvest)
+
+    def _let_go(self, harvest: Harvest, *, all_of_them: bool = False) -> None:
+        """Let the poses out whose time it is, or all that wait."""
+        departing = self._departure.due(self._history, self._rig, self._eyes, self._moved_px, all_of_them=all_of_them)
+        harvest.estimates += departing
 
     def _follow(self, frames: Round, t_ns: int, harvest: Harvest) -> Update | None:
         """Update the track with a round; a late one is put in where it belongs and what came after is done again."""
@@ -206,6 +215,7 @@ class Tracker:
             self._eyes.suppose(gains)
             return None
         self._whole.clear()
+        self._let_go(harvest, all_of_them=True)
         self._history.restart(found)
         self._track = TrackState.TRACKING
         return found
@@ -263,27 +273,6 @@ class Tracker:
         newest = self._history.newest
         if newest is not None and t_ns - newest.t_ns > self._tuning.coast_limit_ns:
             self._track = TrackState.LOST
-
-    def _estimate(self, found: Update, available_ns: int, stages: dict[str, int]) -> Estimate:
-        state = found.state
-        covariance, sigmas_s = reported(state, self._rig, self._eyes.exposure_s, self._eyes.doubts_px, self._moved_px)
-        mean = read_only(state.mean)
-        return Estimate(
-            t_ns=state.t_ns,
-            p_BinW=mean[:3],
-            R_BtoW=mean[3:12].reshape(3, 3),
-            v_BinW=mean[12:15],
-            w_BinB=mean[15:18],
-            covariance=covariance,
-            clock_offsets_s=mean[30:],
-            clock_sigmas_s=sigmas_s,
-            state=self._track,
-            reset_counter=self._continuity.resets,
-            nis=found.nis,
-            nis_dof=found.dof,
-            available_ns=available_ns,
-            stages_ns=MappingProxyType(stages),
-        )
 
 
 def _late(frame: Frame) -> Rejected:

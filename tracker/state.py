@@ -134,6 +134,11 @@ class State:
         mean[31:] += dx[OFFSETS:]
         return replace(self, mean=mean)
 
+    def error_to(self, other: State) -> Array:
+        """Return the error (n,) that moves this state to another one."""
+        turn, step = so3.log(self.R_BtoW.T @ other.R_BtoW), other.mean - self.mean
+        return np.concatenate((step[_P], turn, step[12:30], step[31:]))
+
     def with_parts(self, **parts: Array) -> State:
         """Return the state with other parts of its mean, by their names."""
         mean = self.mean.copy()

@@ -17,6 +17,7 @@ class Tuning:
     coast_limit_ns: without a sighting for longer the track is lost.
     tilt_limit_rad: no vehicle that flies leans further; a pose that does is a mistake, such as a mirrored marker.
     continuity_limit_ns: a track lost for longer cannot claim to be the same on return, whatever its prediction says.
+    lag_rounds: poses go out so many rounds late, put right by those rounds.
     calibrated_px: by how much balls missed when the room was calibrated, one sigma; None where nobody measured it.
     """
 
@@ -26,4 +27,5 @@ class Tuning:
     coast_limit_ns: int
     continuity_limit_ns: int
     tilt_limit_rad: float
+    lag_rounds: int = 0
     calibrated_px: float | None = None

@@ -133,14 +133,14 @@ class Point:
 class Estimate:
     """Where the vehicle is, and how well that is known.
 
-    t_ns: the instant the state holds for [ns].
+    t_ns: the instant the state holds for, mid-exposure of the newest frame of its round [ns].
     p_BinW: (3,) position [m].  R_BtoW: (3, 3) attitude.
     v_BinW: (3,) velocity in W [m/s].  w_BinB: (3,) angular rate of B against W, in B [rad/s].
     covariance: (12, 12) of the errors (position in W, rotation vector in B with R = R_hat exp(theta), velocity in W,
         rate in B) [m, rad, m/s, rad/s].
     reset_counter: grows by one, modulo 256, each time the estimate really jumps.
     nis, nis_dof: normalised innovation squared of the last update and its degrees of freedom (0: no update).
-    available_ns: stopwatch reading when the newest frame in it stood in memory [ns].
+    available_ns: stopwatch reading when that frame stood in memory [ns].
     stages_ns: stopwatch time each stage took for this estimate [ns].
     clock_offsets_s, clock_sigmas_s: (cameras,) how much later than its stamp each camera saw, by camera 0's clock, and
         one sigma of that [s]; empty when it is not estimated.

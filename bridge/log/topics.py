@@ -129,7 +129,7 @@ LOG = protobuf_topic("/log", Log)
 ESTIMATE = json_topic(
     "/estimate",
     "posebridge.Estimate",
-    t_ns=integer("stream time the state holds for: mid-exposure of the newest frame in it [ns]"),
+    t_ns=integer("stream time the state holds for: mid-exposure of the newest frame of its round [ns]"),
     state=text("searching, tracking or lost"),
     reset_counter=integer("grows by one, modulo 256, each time the estimate really jumps"),
     p_BinW_m=numbers("position of the body in the room: x, y, z [m]", 3),
@@ -139,7 +139,7 @@ ESTIMATE = json_topic(
     covariance=numbers("upper triangle, row by row, of the 12 x 12: position, attitude, velocity, rate", 78),
     nis=number("normalised innovation squared of the last update"),
     nis_dof=integer("its degrees of freedom, 0 for no update"),
-    available_ns=integer("stopwatch reading when the newest frame in it stood in memory [ns]"),
+    available_ns=integer("stopwatch reading when that frame stood in memory [ns]"),
     p_3sigma_m=numbers("three standard deviations of the position, for plots: x, y, z in the room [m]", 3),
     clock_offsets_ms=numbers("how much later than its stamp each camera but the first saw, by the first's clock [ms]"),
     clock_sigmas_ms=numbers("one sigma of each of these [ms]"),

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field, Strict
+from pydantic import Field, Strict, model_validator
 
 from bridge.settings.section import NotNegative, Positive, Section
+
+MOST_LAG_ROUNDS = 15  # a second of two triggered cameras: more puts nothing right
 
 
 class ProcessSettings(Section):
@@ -32,4 +34,14 @@ class TrackerSettings(Section):
     gate_probability: Annotated[float, Strict(), Field(gt=0, lt=1)] = 0.999
     pixel_noise_px: Positive = 0.1
     clock_offset_sigma_ms: NotNegative = 20.0
+    lag_rounds: Annotated[int, Strict(), Field(ge=0, le=MOST_LAG_ROUNDS)] = 0
     process: ProcessSettings = ProcessSettings()
+
+    @model_validator(mode="after")
+    def _can_look_back(self) -> Self:
+        if self.lag_rounds and self.method == "paper":
+            raise ValueError(
+                f'lag_rounds = {self.lag_rounds} rounds: the method "paper" keeps no track that later rounds could put '
+                'right; set 0, or method = "ekf"'
+            )
+        return self

@@ -32,6 +32,7 @@ def tuning_of(settings: TrackerSettings) -> Tuning:
         coast_limit_ns=round(settings.coast_limit_ms * NS_PER_MS),
         continuity_limit_ns=round(settings.continuity_limit_ms * NS_PER_MS),
         tilt_limit_rad=math.radians(settings.tilt_limit_deg),
+        lag_rounds=settings.lag_rounds,
     )
 
 

@@ -208,6 +208,7 @@ def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
         ("bgr = [24, 186, 198]", "bgr = [24, 186, 300]", "[[marker.balls]] yellow: bgr = 300: must be at most 255"),
         ("width_px = 640", "width_px = 640.5", "[[rig.cameras]] cam0: width_px = 640.5 px: must be a"),
         ('method = "ekf"', 'method = "ukf"', "[tracker] method = 'ukf': must be 'ekf' or 'paper'; correct it"),
+        ("lag_rounds = 0", "lag_rounds = 16", "[tracker] lag_rounds = 16: must be at most 15"),
         (
             '# messages = ["VISION_POSITION_ESTIMATE"]',
             'messages = ["GPS_INPUT"]',
@@ -253,6 +254,11 @@ def test_a_mistake_is_told_with_section_key_value_limit_and_remedy(
 def test_several_mistakes_are_counted(write: Write) -> None:
     text = edited("# system_id = 1", "system_id = 0").replace("component_id = 197", "component_id = 0")
     assert refusal(write(text)).endswith("[mavlink] system_id = 0: must be at least 1; correct it (and 1 more)")
+
+
+def test_the_papers_method_cannot_wait_for_later_rounds(write: Write) -> None:
+    text = edited('method = "ekf"', 'method = "paper"').replace("lag_rounds = 0", "lag_rounds = 1")
+    assert '[tracker] lag_rounds = 1 rounds: the method "paper" keeps no track' in refusal(write(text))
 
 
 def keys_of(value: object) -> object:

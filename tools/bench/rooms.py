@@ -69,10 +69,13 @@ def _cases(settings: Settings, seed: int) -> Iterator[tuple[str, Trial]]:
     yield "cameras 60 deg apart", replace(plain, rig=ring_rig(marker, spread_deg=60.0, view_deg=36.0))
     yield "3 cameras", replace(plain, rig=ring_rig(marker, 3, view_deg=36.0))
     yield "5 cameras", replace(plain, rig=ring_rig(marker, 5, view_deg=36.0))
-    yield "free running", replace(plain, timing=replace(timing, offsets_ns=FREE_RUNNING_NS))
+    free_running = replace(plain, timing=replace(timing, offsets_ns=FREE_RUNNING_NS))
+    yield "free running", free_running
+    yield "free running, a round late", replace(free_running, lag_rounds=1)
     yield "limits, 4 ms", replace(plain, path="fast")
     yield "limits, 8 ms", replace(plain, path="fast", look=replace(LINEAR, exposure_s=0.008, sub_exposures=9))
-    yield "limits, free running", replace(plain, path="fast", timing=replace(timing, offsets_ns=FREE_RUNNING_NS))
+    yield "limits, free running", replace(free_running, path="fast")
+    yield "limits, free running, a round late", replace(free_running, path="fast", lag_rounds=1)
 
 
 def _room(name: str, trial: Trial, run: Flown) -> Room:

@@ -40,6 +40,7 @@ class Trial:
     stamp_errors_ns: by how much later than the truth each camera's stamps are; empty for none. The first camera's
         clock is that of the estimates, so its own should be 0.
     config: settings of the tracker, and of rig and marker where `rig` is None.
+    lag_rounds: the tracker's.
     """
 
     path: str | ScriptedPath
@@ -49,6 +50,7 @@ class Trial:
     stamp_errors_ns: tuple[int, ...] = ()
     config: str = "lab"
     rig: Rig | None = None
+    lag_rounds: int = 0
 
     def vehicle(self) -> ScriptedPath:
         """Return the truth."""
@@ -140,7 +142,9 @@ def fly(trial: Trial, troubles: Troubles | None = None, spoil: Spoil | None = No
 
 def tracked(trial: Trial, rig: Rig, events: Iterable[Event]) -> Flown:
     """Track what a trial's cameras gave, with a rig as the tracker is told of it, and compare with the truth."""
-    tracker = tracker_of(load_settings(trial.config), rig, _CLOCKS)
+    settings = load_settings(trial.config)
+    late = settings.tracker.model_copy(update={"lag_rounds": trial.lag_rounds})
+    tracker = tracker_of(settings.model_copy(update={"tracker": late}), rig, _CLOCKS)
     steps = [*(tracker.step(event) for event in events), tracker.finish()]
     return compared(steps, trial.vehicle())
 

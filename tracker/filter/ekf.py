@@ -29,20 +29,25 @@ from tracker.filter.predict import Prediction, at_origin
 from tracker.maths.gate import chi2_limit
 from tracker.rig import Rig
 from tracker.state import State
-from tracker.types import BallSighting, Reason, Rejected
+from tracker.types import Array, BallSighting, Reason, Rejected
 
 MAX_SUSPECTS = 8
 POSED = 3  # sightings, which some pose fits whatever they show: their shape tells no liar
 
 
 class Update(NamedTuple):
-    """An updated state, its NIS and degrees of freedom, what was used and what was left out."""
+    """An updated state, its NIS and degrees of freedom, what was used and what was left out.
+
+    P_ahead: the covariance (n, n) of the prediction; None where the state before does not tell of this one: at a start,
+        and where a turn was open.
+    """
 
     state: State
     nis: float
     dof: int
     used: tuple[BallSighting, ...]
     rejected: tuple[Rejected, ...]
+    P_ahead: Array | None = None
 
 
 def update(ahead: Prediction, sightings: tuple[BallSighting, ...], rig: Rig, probability: float) -> Update | Rejected:
@@ -102,7 +107,8 @@ def _chosen(ahead: Prediction, seen: Sighted, rig: Rig, probability: float) -> U
 
 def _updated(ahead: Prediction, best: Fit, rejected: tuple[Rejected, ...]) -> Update:
     state = at_origin(_posterior(ahead, best), ahead.pivot_inB)
-    return Update(state, best.nis, len(best.u), best.sighted.sightings, rejected)
+    P_ahead = None if ahead.turn_open or ahead.dt == 0.0 else best.P
+    return Update(state, best.nis, len(best.u), best.sighted.sightings, rejected, P_ahead)
 
 
 def _fits(one: Fit, probability: float) -> bool:

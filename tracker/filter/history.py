@@ -10,7 +10,7 @@ from tracker.filter.noise import doubted
 from tracker.state import State
 from tracker.types import BallSighting
 
-KEPT = 8  # updates
+KEPT = 8  # updates, and those that poses wait for
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -22,10 +22,13 @@ class Later:
 
 
 class History:
-    """States after the newest updates, in order of time, with what made them."""
+    """States after the newest updates, in order of time, with what made them.
 
-    def __init__(self) -> None:
-        self._updates: deque[Update] = deque(maxlen=KEPT)
+    lag_rounds: by how many of them poses go out late.
+    """
+
+    def __init__(self, lag_rounds: int = 0) -> None:
+        self._updates: deque[Update] = deque(maxlen=KEPT + lag_rounds)
 
     @property
     def newest(self) -> State | None:
@@ -51,6 +54,14 @@ class History:
             newest = self._updates[-1]
             noise = doubted(newest.state.noise, camera, sigma_px)
             self.restart(newest._replace(state=replace(newest.state, noise=noise)))
+
+    def since(self, t_ns: int) -> list[Update]:
+        """Return the update of an instant and those after it; none when it was taken back or is forgotten."""
+        updates = self._updates
+        if updates[-1].state.t_ns == t_ns:  # as it is where poses do not wait
+            return [updates[-1]]
+        later = [update for update in updates if update.state.t_ns >= t_ns]
+        return later if later and later[0].state.t_ns == t_ns else []
 
     def back_to(self, t_ns: int) -> list[Later]:
         """Take back the updates after an instant that is not forgotten; return them in order of time."""
