@@ -10,7 +10,7 @@ from tracker.filter import manoeuvre
 from tracker.filter.batch import Batch, Sighted
 from tracker.filter.bend import bend_noise
 from tracker.filter.correction import TILT_ROWS, likeliest, weighed
-from tracker.filter.manoeuvre import expected, judged, log_likelihoods
+from tracker.filter.manoeuvre import as_gained, expected, judged, log_likelihoods
 from tracker.filter.matern import process_noise
 from tracker.filter.measure import Indices, camera_table
 from tracker.filter.predict import Prediction
@@ -103,7 +103,7 @@ def prepared(
         before, levels = levels, judged(levels, log_likelihoods(y, A, B, of, expected(levels, of)))
         if unseen and expected(levels, of)[1] < expected(before, of)[1]:
             levels[1] = before[1]
-    means = expected(levels, of)
+    means = as_gained(levels, of, A, B)
     R, noise, doubts = np.zeros((n + TILT_ROWS, n + TILT_ROWS)), 0.0, 0.0
     for i in range(n):
         for j in range(n):

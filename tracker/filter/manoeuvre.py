@@ -15,12 +15,15 @@ from functools import lru_cache
 
 import numpy as np
 
+from tracker.filter.correction import inverse_of
 from tracker.filter.matern import KINDS, MOTIONS
 from tracker.maths.compiled import compiled
+from tracker.maths.solve import dot
 from tracker.state import Process
 from tracker.types import Array
 
 LEVELS = 9
+AXES = 3  # of a motion
 STEP = 3.0  # of sigma from one level to the next
 SUDDEN_S = 0.1  # within it the briskest manoeuvre begins; one a third as brisk takes three times as long
 CHANGE_S = 0.7  # a level is kept for about so long
@@ -134,4 +137,34 @@ def expected(levels: Array, of: Array) -> Array:
     means = np.empty(KINDS * MOTIONS)
     for k in range(KINDS * MOTIONS):
         means[k] = (levels[k % MOTIONS] * of[k]).sum()
+    return means
+
+
+@compiled("f8[::1](f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])")
+def as_gained(levels: Array, of: Array, A: Array, B: Array) -> Array:
+    """Return the strengths (KINDS * MOTIONS,) with which one update gains what the levels' own gain in the mean.
+
+    levels, of: as for `expected`, after the pixels.  A, B: as for `log_likelihoods`.
+    Source: of an innovation with variance a that a manoeuvre of strength s raises by b s, the update takes the share
+        w(s) = b s / (a + b s) for the manoeuvre and leaves it the variance s (1 - w) = (a / b) w. Both are linear in
+        w: mean and variance of the levels' mixture, but for how far their means lie apart, are those of the one
+        strength whose w is the mean of w. The mean strength gains more, since w is concave, and leaves the state
+        less sure than it is. b / a is the trace of A^-1 B over the motion's axes.
+    """
+    means, inverse = expected(levels, of), inverse_of(A)
+    for motion in range(MOTIONS):
+        b = np.zeros(KINDS)
+        for kind in range(KINDS):
+            for i in range(len(inverse)):
+                b[kind] += dot(inverse[i], B[kind * MOTIONS + motion, i]) / AXES
+        raised = gained = 0.0
+        for level in range(levels.shape[1]):
+            bs = 0.0
+            for kind in range(KINDS):
+                bs += of[kind * MOTIONS + motion, level] * b[kind]
+            raised += levels[motion, level] * bs
+            gained += levels[motion, level] * bs / (1.0 + bs)
+        if raised > 0.0:
+            for kind in range(KINDS):
+                means[kind * MOTIONS + motion] *= gained / (1.0 - gained) / raised
     return means

@@ -10,10 +10,21 @@ from scipy.stats import multivariate_normal
 
 from tests.tracker.rigs import PROCESS, ring_rig, sightings, state
 from tracker.filter.batch import make_batch, sighted
-from tracker.filter.manoeuvre import LEVELS, RARER, expected, later, log_likelihoods, start_levels, strengths
-from tracker.filter.matern import MOTIONS, process_noise
+from tracker.filter.manoeuvre import (
+    AXES,
+    LEVELS,
+    RARER,
+    as_gained,
+    expected,
+    later,
+    log_likelihoods,
+    start_levels,
+    strengths,
+)
+from tracker.filter.matern import KINDS, MOTIONS, process_noise
 from tracker.filter.measure import predicted_pixels
 from tracker.filter.predict import predict
+from tracker.types import Array
 
 OF = strengths(PROCESS)
 
@@ -52,3 +63,43 @@ def test_each_strength_adds_its_process_noise_to_the_innovation(strength: int) -
     H = np.concatenate([predicted_pixels(ahead.state, rig, s.camera, s.t_ns)[1][s.ball] for s in seen])
     Q = process_noise(25, ahead.dt, PROCESS.manoeuvre_s, np.eye(4)[strength])
     assert np.allclose(batch.B[strength] - batch.path[strength], H @ Q @ H.T)
+
+
+def shown(seed: int) -> tuple[Array, Array]:
+    """Return A (6, 6) and B (KINDS * MOTIONS, 6, 6) of which each adds to three axes of its motion alone."""
+    rng = np.random.default_rng(seed)
+    B = np.zeros((KINDS * MOTIONS, 6, 6))
+    for k in range(len(B)):
+        own = slice(AXES * (k % MOTIONS), AXES * (k % MOTIONS + 1))
+        B[k, own, own] = np.eye(AXES) * rng.uniform(0.1, 3.0)
+    return np.eye(6) * rng.uniform(0.5, 2.0), B
+
+
+def gain(A: Array, B: Array, strengths: Array, motion: int) -> float:
+    """Return the share of an innovation along one of a motion's axes that an update takes for the manoeuvre's."""
+    axis = AXES * motion
+    raised = float(strengths[motion::MOTIONS] @ B[motion::MOTIONS, axis, axis])
+    return raised / (float(A[axis, axis]) + raised)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_one_update_gains_what_the_levels_own_updates_gain_in_the_mean(seed: int) -> None:
+    A, B = shown(seed)
+    levels = np.random.default_rng(seed).dirichlet(np.full(LEVELS, 0.5), MOTIONS)
+    one = as_gained(levels, OF, A, B)
+    for motion in range(MOTIONS):
+        each = [gain(A, B, OF[:, level], motion) for level in range(LEVELS)]
+        assert gain(A, B, one, motion) == pytest.approx(levels[motion] @ each)
+    assert (one <= expected(levels, OF) * (1.0 + 1e-12)).all()
+
+
+@pytest.mark.parametrize("level", range(LEVELS))
+def test_a_level_that_is_certain_keeps_its_strength(level: int) -> None:
+    levels = np.zeros((MOTIONS, LEVELS))
+    levels[:, level] = 1.0
+    assert np.allclose(as_gained(levels, OF, *shown(level)), OF[:, level])
+
+
+def test_without_time_for_a_manoeuvre_the_mean_strength_stands() -> None:
+    A, B = shown(1)
+    assert np.array_equal(as_gained(start_levels(), OF, A, np.zeros_like(B)), expected(start_levels(), OF))
