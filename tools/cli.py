@@ -18,10 +18,10 @@ from tools.commands.bench import bench
 from tools.commands.calibrate import calibrate
 from tools.commands.common import RealClocks
 from tools.request import Clocks, CpuClocks
+from tools.start import EXIT_INTERRUPTED
 from tracker.errors import OperatorError
 
 EXIT_OPERATOR = 2
-EXIT_INTERRUPTED = 130
 ONE_THREAD_EACH = ("OPENCV_FOR_THREADS_NUM", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
