@@ -47,9 +47,11 @@ TLOG = ".tlog"
 LOGGED_PACKAGES = ("posebridge", "numpy", "opencv-python-headless", "filterpy", "pymavlink", "scipy", "mcap")
 
 
-def run_session(request: RunRequest, clocks: Clocks) -> None:
+def run_session(request: RunRequest, clocks: Clocks) -> bool:
     """Fly a source to its end, or to Ctrl-C, which closes links and log in order and is raised again.
 
+    Returns:
+        bool: whether the run came to any pose at all.
     Raises:
         OperatorError: a source, link, log or summary that cannot be opened.
         KeyboardInterrupt: the operator ended the run.
@@ -84,6 +86,7 @@ def run_session(request: RunRequest, clocks: Clocks) -> None:
             stack.close()
             if not refused:
                 _report(outlets, request, console, opened.troubles())
+    return monitor.tally().estimates_sent > 0
 
 
 def _check_outputs(request: RunRequest) -> None:
