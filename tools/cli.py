@@ -112,8 +112,9 @@ def posebridge(
 ) -> None:
     """Cameras watch coloured balls on a vehicle; its autopilot gets its pose over MAVLink.
 
-    Exit code 0: done. 1: done, and not good: a run without a pose, a demo's path, colours, a place, a calibration,
-    a check.
-    2: something you can mend, told in one line. 130: interrupted, links and log closed in order.
+    Exit code 0: done.
+    1: done, and not good: a run without a pose, the path of a demo, colours, a place, a calibration, a check.
+    2: something you can mend, told in one line.
+    130: interrupted, links and log closed in order.
     """
     context.obj = _real_clocks()

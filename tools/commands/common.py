@@ -9,7 +9,6 @@ import typer
 
 from tools.request import Clocks, CpuClocks
 
-
 EXIT_NO_POSE = 1
 
 
