@@ -9,7 +9,7 @@ import sys
 import time
 from collections.abc import Sequence
 from types import FrameType
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -47,7 +47,8 @@ def run_command_line(arguments: Sequence[str]) -> int:
     try:
         return int(app(list(arguments), prog_name="posebridge", standalone_mode=False) or 0)
     except typer.TyperException as error:
-        return _refuse(f"{error.format_message().rstrip('.')}; see `posebridge --help`")
+        message = error.format_message().replace("Value error, ", "").rstrip(".")
+        return _refuse(f"{message}; see `{_named_in(arguments)} --help`")
     except OperatorError as error:
         return _refuse(str(error))
     except KeyboardInterrupt:  # before the command began; within it, typer itself returns 130
@@ -61,6 +62,18 @@ def _keep_to_one_core() -> None:
     """
     for name in ONE_THREAD_EACH:
         os.environ.setdefault(name, "1")
+
+
+def _named_in(arguments: Sequence[str]) -> str:
+    """Return the command that arguments begin with, as far as there is one: its help page lists its options."""
+    words: list[str] = ["posebridge"]
+    known: Any = typer.main.get_command(app)
+    for word in arguments:
+        known = getattr(known, "commands", {}).get(word)
+        if known is None:
+            break
+        words.append(word)
+    return " ".join(words)
 
 
 def _refuse(message: str) -> int:

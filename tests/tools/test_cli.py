@@ -9,6 +9,8 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Iterator
+from inspect import cleandoc
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +24,7 @@ from tools.cli import app
 
 ROOT = Path(__file__).parents[2]
 LAB = shipped_configs()["lab"].read_text(encoding="utf-8")
+COMMANDS = {"run", "demo", "export", "calibrate", "room"}
 
 
 def posebridge(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
@@ -50,19 +53,21 @@ def refusal(*arguments: str | Path) -> str:
         (["fly"], "No such command 'fly'"),
         (["run", "--config"], "Option '--config' requires an argument"),
         (["run", "--config", "lab", "--sauce", "x"], "No such option: --sauce"),
-        (["run", "--config", "lab", "--pace", "slow"], "Invalid value for '--pace': Value error, 'slow' is not one of"),
+        (["run", "--config", "lab", "--pace", "slow"], "Invalid value for '--pace': 'slow' is not one of"),
         (["run", "--config", "lab", "more"], "Got unexpected extra argument"),
         (["demo", "--duration_s", "long"], "Invalid value for '--duration_s'"),
         (["demo", "--seed", "1.5"], "Invalid value for '--seed'"),
         (["export"], "Missing argument 'log'"),
         (["export", "a.mcap"], "Missing option '--format'"),
-        (["export", "a.mcap", "--format", "xls"], "Invalid value for '--format': Value error, 'xls' is not one of"),
+        (["calibrate", "room", "--seconds", "long"], "Invalid value for '--seconds'"),
+        (["export", "a.mcap", "--format", "xls"], "Invalid value for '--format': 'xls' is not one of"),
     ],
 )  # fmt: skip
 def test_wrong_usage_is_one_line_that_points_to_the_help(arguments: list[str], complaint: str) -> None:
     line = refusal(*arguments)
     assert complaint in line
-    assert line.endswith("; see `posebridge --help`")
+    command = " ".join(["posebridge", *takewhile(lambda word: word in COMMANDS, arguments)])
+    assert line.endswith(f"; see `{command} --help`")
 
 
 def described(command: Any) -> Iterator[Any]:
@@ -77,6 +82,14 @@ def test_no_help_is_taken_for_markup_and_swallowed() -> None:
     texts = [each.help for each in described(get_command(app)) if each.help]
     assert len(texts) > 100
     assert [Text.from_markup(text).plain for text in texts] == texts
+
+
+def test_no_line_of_a_help_page_breaks_within_a_sentence() -> None:
+    """Typer joins the lines of the first paragraph alone."""
+    pages = [cleandoc(each.help).split("\n\n") for each in described(get_command(app)) if each.help]
+    lines = [line for page in pages for paragraph in page[1:] for line in paragraph.splitlines()]
+    assert len(lines) > 10
+    assert [line for line in lines if not line.endswith(".")] == []
 
 
 def test_an_option_without_a_value_shows_none_in_its_help() -> None:
