@@ -116,12 +116,12 @@ def _print(figures: Figures) -> None:
         table.add_row(f"latency ms {name}", *cells, "")
     table.add_row("rejected", *(_cell(sum(one["rejected"].values())) for one in (a, b)), "")
     same = figures["same_mavlink_bytes"]
-    said = {True: "the same", False: "differ", None: "-"}[same]
-    table.add_row("MAVLink bytes", *(_cell(sum(one["sent"].values())) for one in (a, b)), said)
+    said = {True: "same bytes", False: "other bytes", None: "-"}[same]
+    table.add_row("messages sent", *(_cell(sum(one["sent"].values())) for one in (a, b)), said)
     screen().print(table)
 
 
 def _cell(value: float | None) -> str:
     if value is None:
         return "-"
-    return str(value) if isinstance(value, int) else f"{value:.3f}"
+    return str(value) if isinstance(value, int) else f"{value:z.3f}"
