@@ -47,8 +47,12 @@ class ExportTerms:
         low, high = RATES_HZ
         if self.rate_hz is not None and not low <= self.rate_hz <= high:
             raise OperatorError(f"--rate_hz: {self.rate_hz:g} Hz must be {low:g} to {high:g} Hz; give a rate within")
-        if self.gap_ms is not None and (self.rate_hz is None or not self.gap_ms > 0):
-            raise OperatorError(f"--gap_ms: {self.gap_ms:g} ms must be positive, and needs --rate_hz; give both")
+        if self.gap_ms is not None and not self.gap_ms > 0:
+            raise OperatorError(f"--gap_ms: {self.gap_ms:g} ms must be positive; give a longer one")
+        if self.gap_ms is not None and self.rate_hz is None:
+            raise OperatorError(
+                f"--gap_ms: {self.gap_ms:g} ms: only rows at a fixed rate have gaps; give --rate_hz too"
+            )
         if self.format == "tlog" and self.rate_hz is not None:
             raise OperatorError("--rate_hz: a tlog holds messages as they were, at no fixed rate; leave it out")
 

@@ -56,7 +56,8 @@ def table(episodes: tuple[Episode, ...]) -> RenderableType:
     """Lay the alarms of a flight out, a line each."""
     if not episodes:
         return Text("No alarm on the way.", "green")
-    lines = [Text(f"{len(episodes)} alarms on the way, by the time in the flight:", "bold")]
+    count = "1 alarm" if len(episodes) == 1 else f"{len(episodes)} alarms"
+    lines = [Text(f"{count} on the way, by the time in the flight:", "bold")]
     for episode in episodes[:SHOWN]:
         alarm = episode.alarm
         style = "bold red" if alarm.level is Level.ALARM else "yellow"

@@ -16,6 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
+from bridge.alarms import Alarm, Level
 from bridge.telemetry.post import HOST, Post
 from bridge.telemetry.snapshot import to_bytes
 from bridge.telemetry.states import Surroundings
@@ -26,7 +27,7 @@ from tools.cli import run_command_line
 from tools.monitor.attach import attach
 from tools.monitor.bars import BLOCKS, PLAIN, bars
 from tools.monitor.page import page
-from tools.monitor.review import review
+from tools.monitor.review import Episode, review, table
 from tracker.types import TrackState
 
 SECOND_NS = 1_000_000_000
@@ -148,6 +149,15 @@ def test_a_log_is_shown_with_every_alarm_on_the_way(tmp_path: Path, capsys: pyte
     assert "a gap of 1033 ms between poses" in " ".join(capsys.readouterr().out.split())
     (gap,) = (episode for episode in review(tmp_path / "a.mcap").episodes if episode.alarm.name == "gap_severe")
     assert gap.from_s == pytest.approx(150 / 30 + 0.3, abs=0.4)
+
+
+def test_one_alarm_is_counted_as_one() -> None:
+    one = Episode(Alarm("gap", "", Level.ALARM, "a gap", "mend it", 1.0), 2.0, 3.0)
+    for episodes, words in (((one,), "1 alarm on the way"), ((one, one), "2 alarms on the way")):
+        console = Console(width=80)
+        with console.capture() as shown:
+            console.print(table(episodes))
+        assert words in shown.get()
 
 
 def test_the_page_fits_eighty_columns_whatever_the_names() -> None:
