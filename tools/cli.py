@@ -9,7 +9,7 @@ import sys
 import time
 from collections.abc import Sequence
 from types import FrameType
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -20,6 +20,9 @@ from tools.commands.common import RealClocks
 from tools.request import Clocks, CpuClocks
 from tools.start import EXIT_INTERRUPTED
 from tracker.errors import OperatorError
+
+if TYPE_CHECKING:
+    from sys import UnraisableHookArgs
 
 EXIT_OPERATOR = 2
 ONE_THREAD_EACH = ("OPENCV_FOR_THREADS_NUM", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
@@ -84,7 +87,8 @@ def _refuse(message: str) -> int:
 def _interrupt_once() -> None:
     """Let the first SIGINT or SIGTERM end the run in order, as a KeyboardInterrupt, and later ones pass.
 
-    `timeout`, and Ctrl-C through `make`, may signal twice: the second must not spoil the closing of the log.
+    `timeout`, and Ctrl-C through `make`, may signal twice: the second must not spoil the closing of the log. One that
+    comes while a library written in C calls back is lost, since no exception rises through it: then the next counts.
     """
 
     def interrupt(_number: int, _frame: FrameType | None) -> None:
@@ -92,8 +96,18 @@ def _interrupt_once() -> None:
             signal.signal(each, signal.SIG_IGN)
         raise KeyboardInterrupt
 
-    for each in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(each, interrupt)
+    def lost(unraisable: UnraisableHookArgs) -> None:
+        if unraisable.exc_type is KeyboardInterrupt:
+            listen()
+        else:
+            heard_before(unraisable)
+
+    def listen() -> None:
+        for each in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(each, interrupt)
+
+    heard_before, sys.unraisablehook = sys.unraisablehook, lost
+    listen()
 
 
 def _real_clocks() -> RealClocks:

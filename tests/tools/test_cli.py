@@ -222,6 +222,28 @@ sys.exit(cli.run_command_line(["wait"]))
     assert (done.returncode, done.stdout, done.stderr) == (130, "closed\n", "")
 
 
+def test_a_signal_that_got_lost_in_a_library_is_quiet_and_the_next_one_counts() -> None:
+    code = """
+import ctypes, os, signal, sys
+from tools import cli
+def interrupt():
+    os.kill(os.getpid(), signal.SIGINT)
+    for _ in range(1000):
+        pass
+@cli.app.command()
+def wait():
+    ctypes.CFUNCTYPE(None)(interrupt)()
+    print("lost", flush=True)
+    interrupt()
+    print("deaf", flush=True)
+sys.exit(cli.run_command_line(["wait"]))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False, timeout=60
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (130, "lost\n", "")
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 @pytest.mark.parametrize("module", ["tools.cli", "typer", "tools.commands.logs"])
 def test_a_signal_while_the_command_line_is_loaded_is_quiet_too(module: str, number: signal.Signals) -> None:
