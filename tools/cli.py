@@ -17,6 +17,7 @@ from tools.commands import fly, identify, logs, place, prepare
 from tools.commands.bench import bench
 from tools.commands.calibrate import calibrate
 from tools.commands.common import RealClocks
+from tools.commands.group import Commands
 from tools.request import Clocks, CpuClocks
 from tools.start import EXIT_INTERRUPTED
 from tracker.errors import OperatorError
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
 EXIT_OPERATOR = 2
 ONE_THREAD_EACH = ("OPENCV_FOR_THREADS_NUM", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+app = Commands(add_completion=False, pretty_exceptions_enable=False)
 _COMMANDS = (
     fly.run, fly.demo, logs.replay, logs.compare, logs.export, logs.monitor, prepare.key, prepare.colours, place.place,
     fly.sitl, prepare.check, identify.excite, identify.sysid,

@@ -95,6 +95,10 @@ def test_no_line_of_a_help_page_breaks_within_a_sentence() -> None:
 def test_an_option_without_a_value_shows_none_in_its_help() -> None:
     flags = [each for each in described(get_command(app)) if getattr(each, "is_flag", False)]
     assert {each.metavar for each in flags} == {""}
+    for page in ("--help",), ("run", "--help"), ("calibrate", "--help"), ("bench", "speed", "--help"):
+        shown = posebridge(*page).stdout
+        assert "Show this message and exit" in shown
+        assert "<bool>" not in shown
 
 
 @pytest.mark.parametrize("duration_s", ["0", "-3", "nan", "inf", "1e9"])

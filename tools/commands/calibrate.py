@@ -8,10 +8,11 @@ from typing import Annotated
 import typer
 
 from tools.commands.common import ConfigOption, JsonOption, SourceOption, clocks_of, flag, tell_of_compiling
+from tools.commands.group import Commands
 
 EXIT_CALIBRATION_NOT_GOOD = 1
 
-calibrate = typer.Typer(help="Calibrate cameras: print a board, find lenses, find the room, convert files.")
+calibrate = Commands(help="Calibrate cameras: print a board, find lenses, find the room, convert files.")
 
 KindOption = Annotated[str, typer.Option("--board", help="charuco or chessboard.", metavar="KIND")]
 CornersOption = Annotated[str, typer.Option(help="Inner corners of the board, as OpenCV counts them.", metavar="CxR")]
