@@ -9,7 +9,7 @@ import sys
 import time
 from collections.abc import Sequence
 from types import FrameType
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -17,14 +17,18 @@ from tools.commands import fly, identify, logs, place, prepare
 from tools.commands.bench import bench
 from tools.commands.calibrate import calibrate
 from tools.commands.common import RealClocks
+from tools.commands.group import Commands
 from tools.request import Clocks, CpuClocks
+from tools.start import EXIT_INTERRUPTED
 from tracker.errors import OperatorError
 
+if TYPE_CHECKING:
+    from sys import UnraisableHookArgs
+
 EXIT_OPERATOR = 2
-EXIT_INTERRUPTED = 130
 ONE_THREAD_EACH = ("OPENCV_FOR_THREADS_NUM", "OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
-app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+app = Commands(add_completion=False, pretty_exceptions_enable=False)
 _COMMANDS = (
     fly.run, fly.demo, logs.replay, logs.compare, logs.export, logs.monitor, prepare.key, prepare.colours, place.place,
     fly.sitl, prepare.check, identify.excite, identify.sysid,
@@ -47,7 +51,8 @@ def run_command_line(arguments: Sequence[str]) -> int:
     try:
         return int(app(list(arguments), prog_name="posebridge", standalone_mode=False) or 0)
     except typer.TyperException as error:
-        return _refuse(f"{error.format_message().rstrip('.')}; see `posebridge --help`")
+        message = error.format_message().replace("Value error, ", "").rstrip(".")
+        return _refuse(f"{message}; see `{_named_in(arguments)} --help`")
     except OperatorError as error:
         return _refuse(str(error))
     except KeyboardInterrupt:  # before the command began; within it, typer itself returns 130
@@ -63,6 +68,18 @@ def _keep_to_one_core() -> None:
         os.environ.setdefault(name, "1")
 
 
+def _named_in(arguments: Sequence[str]) -> str:
+    """Return the command that arguments begin with, as far as there is one: its help page lists its options."""
+    words: list[str] = ["posebridge"]
+    known: Any = typer.main.get_command(app)
+    for word in arguments:
+        known = getattr(known, "commands", {}).get(word)
+        if known is None:
+            break
+        words.append(word)
+    return " ".join(words)
+
+
 def _refuse(message: str) -> int:
     sys.stderr.write(f"posebridge: error: {' '.join(message.split())}\n")
     return EXIT_OPERATOR
@@ -71,7 +88,8 @@ def _refuse(message: str) -> int:
 def _interrupt_once() -> None:
     """Let the first SIGINT or SIGTERM end the run in order, as a KeyboardInterrupt, and later ones pass.
 
-    `timeout`, and Ctrl-C through `make`, may signal twice: the second must not spoil the closing of the log.
+    `timeout`, and Ctrl-C through `make`, may signal twice: the second must not spoil the closing of the log. One that
+    comes while a library written in C calls back is lost, since no exception rises through it: then the next counts.
     """
 
     def interrupt(_number: int, _frame: FrameType | None) -> None:
@@ -79,8 +97,18 @@ def _interrupt_once() -> None:
             signal.signal(each, signal.SIG_IGN)
         raise KeyboardInterrupt
 
-    for each in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(each, interrupt)
+    def lost(unraisable: UnraisableHookArgs) -> None:
+        if unraisable.exc_type is KeyboardInterrupt:
+            listen()
+        else:
+            heard_before(unraisable)
+
+    def listen() -> None:
+        for each in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(each, interrupt)
+
+    heard_before, sys.unraisablehook = sys.unraisablehook, lost
+    listen()
 
 
 def _real_clocks() -> RealClocks:
@@ -112,7 +140,9 @@ def posebridge(
 ) -> None:
     """Cameras watch coloured balls on a vehicle; its autopilot gets its pose over MAVLink.
 
-    Exit code 0: done. 1: done, and not good: the path of a demo, colours, a place, a calibration, a check.
-    2: something you can mend, told in one line. 130: interrupted, links and log closed in order.
+    Exit code 0: done.
+    1: done, and not good: a run without a pose, the path of a demo, colours, a place, a calibration, a check.
+    2: something you can mend, told in one line.
+    130: interrupted, links and log closed in order.
     """
     context.obj = _real_clocks()

@@ -18,11 +18,12 @@ def keep(inputs: tuple[Path, ...], out: Path | None, what: str) -> None:
         OperatorError: the output is one of the inputs, by whatever path.
     """
     for each in inputs:
-        if out is not None and _are_one(each, out):
+        if out is not None and are_one(each, out):
             raise OperatorError(f"{what} {out}: this command goes by that file, which is kept; name another")
 
 
-def _are_one(one: Path, other: Path) -> bool:
+def are_one(one: Path, other: Path) -> bool:
+    """Say whether two paths lead, or would lead, to the same file; a device is never one."""
     if one.exists() and other.exists():
         return one.is_file() and one.samefile(other)
     return one.resolve() == other.resolve()

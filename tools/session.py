@@ -43,13 +43,17 @@ from tracker.sources.uri import parse_source
 from tracker.start.paper import PaperTracker
 from tracker.types import Event
 
+CALIBRATED_REMEDY = "check colours (`posebridge colours`), marker and that T_BS is camera to room"
+NOMINAL_REMEDY = "calibrate the cameras' lenses and the room first (docs/rig.md), then check colours and marker"
 TLOG = ".tlog"
 LOGGED_PACKAGES = ("posebridge", "numpy", "opencv-python-headless", "filterpy", "pymavlink", "scipy", "mcap")
 
 
-def run_session(request: RunRequest, clocks: Clocks) -> None:
+def run_session(request: RunRequest, clocks: Clocks) -> bool:
     """Fly a source to its end, or to Ctrl-C, which closes links and log in order and is raised again.
 
+    Returns:
+        bool: whether the run came to any pose at all.
     Raises:
         OperatorError: a source, link, log or summary that cannot be opened.
         KeyboardInterrupt: the operator ended the run.
@@ -83,7 +87,8 @@ def run_session(request: RunRequest, clocks: Clocks) -> None:
             close(clock, outlets)
             stack.close()
             if not refused:
-                _report(outlets, request, console, opened.troubles())
+                _report(outlets, request, console, opened)
+    return monitor.tally().estimates_sent > 0
 
 
 def _check_outputs(request: RunRequest) -> None:
@@ -95,19 +100,20 @@ def _check_outputs(request: RunRequest) -> None:
         check_summary_path(request.summary)
 
 
-def _report(outlets: Outlets, request: RunRequest, console: Console, source_troubles: tuple[str, ...]) -> None:
+def _report(outlets: Outlets, request: RunRequest, console: Console, opened: OpenedSource) -> None:
     """Give the run's figures, an interrupted one's too, on stdout; what went wrong on stderr, quiet or not."""
     summary = outlets.summary(None if request.log is None else str(request.log))
     if not request.quiet:
         screen().print(to_text(summary), soft_wrap=True)
     frames = "" if outlets.recorder is None else outlets.recorder.state().frames
-    for trouble in (*source_troubles, *_troubles(summary, outlets.monitor.last_rejection, frames)):
+    nominal = opened.chosen.nominal
+    for trouble in (*opened.troubles(), *_troubles(summary, outlets.monitor.last_rejection, frames, nominal)):
         console.print(f"posebridge: warning: {trouble}", style="yellow", soft_wrap=True)
     if request.summary is not None:
         write_summary(request.summary, summary)
 
 
-def _troubles(summary: Summary, last_rejection: str, frames: str) -> Iterator[str]:
+def _troubles(summary: Summary, last_rejection: str, frames: str, nominal: bool) -> Iterator[str]:
     """Yield what the operator must not miss, a line each."""
     if summary.log is not None and summary.log.error:
         yield summary.log.error
@@ -115,7 +121,7 @@ def _troubles(summary: Summary, last_rejection: str, frames: str) -> Iterator[st
         yield frames
     if not summary.estimates_sent:
         why = f"; last: {last_rejection}" if last_rejection else ""
-        yield f"no pose was found in any frame{why}; check colours, marker and that T_BS is camera to room"
+        yield f"no pose was found in any frame{why}; {NOMINAL_REMEDY if nominal else CALIBRATED_REMEDY}"
 
 
 def tracker_of(settings: Settings, rig: Rig, clocks: Clocks) -> Steps:

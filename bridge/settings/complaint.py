@@ -63,6 +63,9 @@ def _limit(found: Mapping[str, Any], unit: str) -> str:
     if found["type"] in ("too_short", "too_long"):
         wanted = context.get("min_length") or context["max_length"]
         return f"holds {context['actual_length']} values, wanted {wanted}; correct it"
+    if found["type"] in ("string_too_short", "string_too_long"):
+        wanted = context.get("min_length") or context["max_length"]
+        return f"has {len(found['input'])} characters, wanted {wanted}; correct it"
     if found["type"] in KINDS:
         return f"must be {KINDS[found['type']]}; correct it"
     if found["type"] == "literal_error":

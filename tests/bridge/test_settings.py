@@ -206,6 +206,11 @@ def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
             "[[marker.balls]] yellow: position_mm = [-80.0, -46.188] mm: holds 2 values, wanted 3; correct it",
         ),
         ("bgr = [24, 186, 198]", "bgr = [24, 186, 300]", "[[marker.balls]] yellow: bgr = 300: must be at most 255"),
+        (
+            'fourcc = "MJPG"',
+            'fourcc = "MJPEG"',
+            "[[rig.cameras]] cam0: fourcc = 'MJPEG': has 5 characters, wanted 4; correct it",
+        ),
         ("width_px = 640", "width_px = 640.5", "[[rig.cameras]] cam0: width_px = 640.5 px: must be a"),
         ('method = "ekf"', 'method = "ukf"', "[tracker] method = 'ukf': must be 'ekf' or 'paper'; correct it"),
         ("lag_rounds = 0", "lag_rounds = 16", "[tracker] lag_rounds = 16: must be at most 15"),

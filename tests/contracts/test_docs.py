@@ -11,9 +11,10 @@ import typer
 from typer.core import TyperCommand, TyperGroup
 
 from tools.cli import app
+from tracker.types import Reason
 
 ROOT = Path(__file__).parents[2]
-PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md")])
+PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
 LINK = re.compile(r"\]\(([^)#\s]*)(?:#([^)\s]+))?\)")
 CALL = re.compile(r"\bposebridge((?: [a-z]+)+)([^`\n#]*)")
 OPTION = re.compile(r"(?<![\w-])--[a-z][\w-]*")
@@ -39,6 +40,12 @@ def test_every_command_shown_exists_with_its_options(page: Path) -> None:
         options = {name for parameter in command.params for name in (*parameter.opts, *parameter.secondary_opts)}
         unknown = set(OPTION.findall(rest)) - options - {"--help"}
         assert not unknown, f"posebridge {' '.join(words)} has no {', '.join(unknown)}"
+
+
+def test_every_reason_for_leaving_something_out_is_explained() -> None:
+    text = (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8")
+    explained = re.findall(r"^\| `(\w+)` \|", text, re.MULTILINE)
+    assert set(Reason) <= set(explained)
 
 
 def test_the_checks_find_something() -> None:

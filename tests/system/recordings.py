@@ -43,8 +43,13 @@ def command(*arguments: str | Path) -> list[str]:
 
 def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     """Run `posebridge run` to its end."""
+    return posebridge("run", *arguments)
+
+
+def posebridge(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
+    """Run the command line to its end."""
     return subprocess.run(
-        command(*arguments),
+        [sys.executable, "-m", "tools", *map(str, arguments)],
         cwd=ROOT, env=os.environ | {"COLUMNS": "100"}, capture_output=True, text=True, check=False, timeout=60,
     )  # fmt: skip
 

@@ -9,11 +9,13 @@ import socket
 import subprocess
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 
 from bridge.log.reader import LogReader
 from bridge.settings import shipped_configs
-from tests.system.recordings import LINK, ROOT, command, images, run, short_copy, summary_of
+from tests.system.recordings import LINK, ROOT, command, images, posebridge, run, short_copy, summary_of
 
 LAB = shipped_configs()["lab"].read_text(encoding="utf-8")
 
@@ -126,6 +128,35 @@ def test_images_that_do_not_decode_are_counted_and_the_run_goes_on(recording: Pa
     assert figures["rejected"]["undecodable"] == 2
     assert figures["frames"] == {"cam0": 4, "cam1": 2}
     assert figures["estimates_sent"] == 4
+
+
+def test_a_run_and_a_replay_without_any_pose_end_with_1(recording: Path, tmp_path: Path) -> None:
+    noise = np.random.default_rng(1)
+    for image in (*images(recording, 0), *images(recording, 1)):
+        cv2.imwrite(str(image), noise.integers(90, 110, (480, 640, 3)).astype(np.uint8))
+    log = tmp_path / "a.mcap"
+    options = ("--link", LINK, "--pace", "fast", "--quiet")
+    done = run("--source", f"recording:{recording}", *options, "--log", log, "--log-frames", "png")
+    again = posebridge("replay", log, "--quiet")
+    assert (done.returncode, again.returncode) == (1, 1)
+    assert done.stderr.startswith("posebridge: warning: no pose was found in any frame; last: not_found, ")
+    assert "check colours (`posebridge colours`)" in done.stderr
+    assert again.stderr == done.stderr
+
+
+def test_a_run_without_any_pose_on_cameras_that_nobody_calibrated_says_what_comes_first(tmp_path: Path) -> None:
+    paths = [tmp_path / "left.mp4", tmp_path / "right.mp4"]
+    noise = np.random.default_rng(1)
+    for path in paths:
+        writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 15.0, (640, 480))
+        for _ in range(3):
+            writer.write(noise.integers(90, 110, (480, 640, 3)).astype(np.uint8))
+        writer.release()
+    done = run("--source", f"video:{paths[0]},{paths[1]}", "--link", LINK, "--pace", "fast", "--quiet")
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1].endswith(
+        "calibrate the cameras' lenses and the room first (docs/rig.md), then check colours and marker"
+    )
 
 
 def test_a_full_disk_ends_the_log_and_not_the_run(recording: Path, tmp_path: Path, full_disk: Path) -> None:

@@ -7,7 +7,10 @@ import shlex
 import signal
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator
+from inspect import cleandoc
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +24,7 @@ from tools.cli import app
 
 ROOT = Path(__file__).parents[2]
 LAB = shipped_configs()["lab"].read_text(encoding="utf-8")
+COMMANDS = {"run", "demo", "export", "calibrate", "room"}
 
 
 def posebridge(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
@@ -49,19 +53,21 @@ def refusal(*arguments: str | Path) -> str:
         (["fly"], "No such command 'fly'"),
         (["run", "--config"], "Option '--config' requires an argument"),
         (["run", "--config", "lab", "--sauce", "x"], "No such option: --sauce"),
-        (["run", "--config", "lab", "--pace", "slow"], "Invalid value for '--pace': Value error, 'slow' is not one of"),
+        (["run", "--config", "lab", "--pace", "slow"], "Invalid value for '--pace': 'slow' is not one of"),
         (["run", "--config", "lab", "more"], "Got unexpected extra argument"),
         (["demo", "--duration_s", "long"], "Invalid value for '--duration_s'"),
         (["demo", "--seed", "1.5"], "Invalid value for '--seed'"),
         (["export"], "Missing argument 'log'"),
         (["export", "a.mcap"], "Missing option '--format'"),
-        (["export", "a.mcap", "--format", "xls"], "Invalid value for '--format': Value error, 'xls' is not one of"),
+        (["calibrate", "room", "--seconds", "long"], "Invalid value for '--seconds'"),
+        (["export", "a.mcap", "--format", "xls"], "Invalid value for '--format': 'xls' is not one of"),
     ],
 )  # fmt: skip
 def test_wrong_usage_is_one_line_that_points_to_the_help(arguments: list[str], complaint: str) -> None:
     line = refusal(*arguments)
     assert complaint in line
-    assert line.endswith("; see `posebridge --help`")
+    command = " ".join(["posebridge", *takewhile(lambda word: word in COMMANDS, arguments)])
+    assert line.endswith(f"; see `{command} --help`")
 
 
 def described(command: Any) -> Iterator[Any]:
@@ -78,9 +84,21 @@ def test_no_help_is_taken_for_markup_and_swallowed() -> None:
     assert [Text.from_markup(text).plain for text in texts] == texts
 
 
+def test_no_line_of_a_help_page_breaks_within_a_sentence() -> None:
+    """Typer joins the lines of the first paragraph alone."""
+    pages = [cleandoc(each.help).split("\n\n") for each in described(get_command(app)) if each.help]
+    lines = [line for page in pages for paragraph in page[1:] for line in paragraph.splitlines()]
+    assert len(lines) > 10
+    assert [line for line in lines if not line.endswith(".")] == []
+
+
 def test_an_option_without_a_value_shows_none_in_its_help() -> None:
     flags = [each for each in described(get_command(app)) if getattr(each, "is_flag", False)]
     assert {each.metavar for each in flags} == {""}
+    for page in ("--help",), ("run", "--help"), ("calibrate", "--help"), ("bench", "speed", "--help"):
+        shown = posebridge(*page).stdout
+        assert "Show this message and exit" in shown
+        assert "<bool>" not in shown
 
 
 @pytest.mark.parametrize("duration_s", ["0", "-3", "nan", "inf", "1e9"])
@@ -206,3 +224,46 @@ sys.exit(cli.run_command_line(["wait"]))
         cwd=ROOT, capture_output=True, text=True, check=False, timeout=60,
     )  # fmt: skip
     assert (done.returncode, done.stdout, done.stderr) == (130, "closed\n", "")
+
+
+def test_a_signal_that_got_lost_in_a_library_is_quiet_and_the_next_one_counts() -> None:
+    code = """
+import ctypes, os, signal, sys
+from tools import cli
+def interrupt():
+    os.kill(os.getpid(), signal.SIGINT)
+    for _ in range(1000):
+        pass
+@cli.app.command()
+def wait():
+    ctypes.CFUNCTYPE(None)(interrupt)()
+    print("lost", flush=True)
+    interrupt()
+    print("deaf", flush=True)
+sys.exit(cli.run_command_line(["wait"]))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False, timeout=60
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (130, "lost\n", "")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("module", ["tools.cli", "typer", "tools.commands.logs"])
+def test_a_signal_while_the_command_line_is_loaded_is_quiet_too(module: str, number: signal.Signals) -> None:
+    scripts = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["scripts"]
+    entry, _, function = scripts["posebridge"].partition(":")
+    code = f"""
+import os, sys
+class Interrupting:
+    def find_spec(self, name, path=None, target=None):
+        if name == "{module}":
+            os.kill(os.getpid(), {int(number)})
+sys.meta_path.insert(0, Interrupting())
+from {entry} import {function}
+{function}()
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code, "--version"], cwd=ROOT, capture_output=True, text=True, check=False, timeout=60
+    )
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")

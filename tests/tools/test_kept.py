@@ -43,6 +43,20 @@ def test_a_log_outlives_the_command_that_reads_it(
     assert log.read_bytes() == before
 
 
+@pytest.mark.parametrize("own", ["flight.tlog", "flight.0.tlog", "flight.12.tlog"])
+def test_the_tlog_that_a_flight_wrote_outlives_exports(own: str, log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = log.with_name(own)
+    path.write_bytes(b"as it was flown")
+    assert run_command_line(["export", str(log), "--format", "tlog", "--out", str(path)]) == EXIT_OPERATOR
+    assert capsys.readouterr().err.endswith(
+        f"export {path}: is what the flight itself wrote beside its log; name another file\n"
+    )
+    for _ in range(2):  # again too: an export is replaced
+        assert run_command_line(["export", str(log), "--format", "tlog"]) == 0
+    assert path.read_bytes() == b"as it was flown"
+    assert log.with_suffix(".export.tlog").read_bytes()
+
+
 @pytest.mark.parametrize(
     "arguments", ["excite --config MY --out MY", "run --config MY --source sim:hover --summary MY"]
 )

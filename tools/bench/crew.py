@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import multiprocessing
 import os
-from collections.abc import Callable, Sequence
+import signal
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
 from typing import TypeVar
 
 import cv2
@@ -29,7 +31,24 @@ def side_by_side(work: Callable[[One], Result], items: Sequence[One]) -> list[Re
     # Spawned: a forked child would inherit the locks of threads that do not live on in it.
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers, mp_context=spawn, initializer=_alone) as pool:
-        return list(pool.map(work, items, chunksize=1))
+        with _unheard():
+            results = [pool.submit(work, item) for item in items]
+        try:
+            return [result.result() for result in results]
+        except BaseException:
+            for process in multiprocessing.active_children():
+                process.kill()
+            raise
+
+
+@contextmanager
+def _unheard() -> Iterator[None]:
+    """Keep Ctrl-C, which a terminal sends to all processes, from those begun meanwhile; here it is only put off."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _alone() -> None:

@@ -9,6 +9,7 @@ from tools.calibrate.board import BoardKind, make_board, parse_pair
 from tools.calibrate.formats.convert import FileFormat, format_of, read_cameras, write_cameras
 from tools.calibrate.sheet import Paper, draw_sheet, largest_square_mm, write_sheet
 from tools.colours.write import check_target
+from tools.suffix import check_suffix
 from tracker.errors import OperatorError
 
 
@@ -60,8 +61,9 @@ def print_board(request: BoardRequest) -> str:
     """Write the sheet and return what to say of it.
 
     Raises:
-        OperatorError: a board that is none or does not fit, or a file that cannot be written.
+        OperatorError: a board that is none or does not fit, a file that is no PDF by its name or cannot be written.
     """
+    check_suffix(request.out, "--out", ".pdf")
     check_target(request.out, "--out", request.overwrite)
     kind, paper = kind_of(request.kind), _paper_of(request.paper)
     trial = make_board(kind, request.corners, request.square_mm or 1.0, None, request.dictionary)

@@ -23,6 +23,7 @@ from tools.calibrate.views import CELLS, Gathering, where_to_go
 from tools.colours.write import check_target
 from tools.request import Clocks
 from tools.screen import screen
+from tools.suffix import check_suffix
 from tracker.errors import OperatorError
 
 ENOUGH_VIEWS, ENOUGH_COVERAGE = 30, 0.85  # of a live camera: it stops by itself
@@ -65,6 +66,7 @@ def run_intrinsics(request: IntrinsicsRequest, clocks: Clocks) -> Calibration:
     for path, option in ((request.out, "--out"), (request.picture, "--picture")):
         if path is not None:
             check_target(path, option, request.overwrite)
+    check_suffix(request.picture, "--picture", ".png")
     footage = open_footage(request.source, load_settings(request.config), clocks)
     gathering = look(footage, request)
     result = calibrate_all(footage.names, gathering, request.board, request.coefficients, request.distance_m)

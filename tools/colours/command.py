@@ -12,13 +12,14 @@ from bridge.settings import ChosenRig, Settings, config_path, load_settings
 from bridge.settings.tuning import tuning_of
 from tools.colours.first import draw_first, first_json, first_text
 from tools.colours.footage import Gathering, gather
-from tools.colours.picture import check_name, draw_palette
+from tools.colours.picture import PNG, draw_palette
 from tools.colours.report import to_json, to_text
 from tools.colours.verdict import judge
 from tools.colours.write import check_target, recoloured, write_config
 from tools.open_source import open_source
 from tools.request import Clocks
 from tools.screen import screen
+from tools.suffix import check_suffix
 from tracker.errors import OperatorError
 from tracker.palette.learn import NoMarkerError, learn
 from tracker.palette.moving import FirstLook, look_first
@@ -61,7 +62,7 @@ def run_colours(request: ColoursRequest, clocks: Clocks) -> bool:
     if request.write is not None:
         check_target(request.write, "--write", request.overwrite)
     if request.picture is not None:
-        check_name(request.picture)
+        check_suffix(request.picture, "--picture", PNG)
         check_target(request.picture, "--picture", overwrite=True)
     settings = load_settings(request.config)
     chosen, gathering = _watch(request, settings, clocks)

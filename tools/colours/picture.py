@@ -21,7 +21,7 @@ WHITE, GREY, PAPER = (255, 255, 255), (170, 170, 170), (24, 24, 24)
 CLASH, CLOSE, FALSE = (255, 0, 255), (230, 190, 60), (60, 60, 255)
 ZOOM, INSET_PX, SEAM = 6, 25, 6
 LINE_PX, MOST_LINES = 18, 12
-SUFFIX = ".png"
+PNG = ".png"
 _FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 
@@ -41,12 +41,6 @@ def draw_palette(palette: Palette, path: Path) -> None:
     write_picture(np.vstack((sheet, _legend(palette, sheet.shape[1]))), path)
 
 
-def check_name(path: Path) -> None:
-    """Raise OperatorError if a path is no name of a PNG."""
-    if path.suffix.lower() != SUFFIX:
-        raise OperatorError(f"--picture {path}: is no name of a PNG; name a path that ends in {SUFFIX}")
-
-
 def write_picture(sheet: Image, path: Path) -> None:
     """Write a PNG; not by OpenCV, whose library speaks up for itself on a full disk.
 
@@ -54,7 +48,7 @@ def write_picture(sheet: Image, path: Path) -> None:
         OperatorError: the file cannot be written.
     """
     try:
-        path.write_bytes(cv2.imencode(SUFFIX, sheet)[1].tobytes())
+        path.write_bytes(cv2.imencode(PNG, sheet)[1].tobytes())
     except OSError as error:
         raise OperatorError(
             f"--picture {path}: cannot be written ({error.strerror}); free space or name a writable path"

@@ -8,9 +8,10 @@ from typing import Annotated
 import typer
 
 from tools.commands.common import ConfigOption, JsonOption, clocks_of, cpu_clocks_of, tell_of_compiling
+from tools.commands.group import Commands
 from tools.request import ExportFormat
 
-bench = typer.Typer(help="Measure accuracy, speed and memory: the figures in docs/benchmarks.md.")
+bench = Commands(help="Measure accuracy, speed and memory: the figures in docs/benchmarks.md.")
 
 
 @bench.command()

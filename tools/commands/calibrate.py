@@ -8,10 +8,11 @@ from typing import Annotated
 import typer
 
 from tools.commands.common import ConfigOption, JsonOption, SourceOption, clocks_of, flag, tell_of_compiling
+from tools.commands.group import Commands
 
 EXIT_CALIBRATION_NOT_GOOD = 1
 
-calibrate = typer.Typer(help="Calibrate cameras: print a board, find lenses, find the room, convert files.")
+calibrate = Commands(help="Calibrate cameras: print a board, find lenses, find the room, convert files.")
 
 KindOption = Annotated[str, typer.Option("--board", help="charuco or chessboard.", metavar="KIND")]
 CornersOption = Annotated[str, typer.Option(help="Inner corners of the board, as OpenCV counts them.", metavar="CxR")]
@@ -108,7 +109,9 @@ def room(
     source: SourceOption = "camera:0,1",
     cameras: Annotated[
         list[Path] | None,
-        typer.Option(help="Lenses, as from calibrate intrinsics; the config's if left out. May be given again."),
+        typer.Option(
+            help="Lenses, as from calibrate intrinsics; the config's if left out. May be given again.", metavar="FILE"
+        ),
     ] = None,
     out: Annotated[
         Path | None, typer.Option(help="Write the room file here: the config with these cameras.", metavar="ROOM.toml")
@@ -148,8 +151,8 @@ def room(
 ) -> None:
     """Find where the cameras hang and how their clocks differ, from the marker waved through the room.
 
-    Then the vehicle stands for 3 s on each of three level spots: the first is the origin, the second lies along x, the
-    third aside. Or a board lies on the floor, its first inner corner the origin, its x axis the room's (docs/room.md).
+    Then the vehicle stands for 3 s on each of three level spots: at the origin, along x from there, and aside.
+    Or a board lies on the floor, its first inner corner the origin, its x axis the room's (docs/room.md).
     Exit code 0: good or usable. 1: not good, with the reasons. 2: something to mend first.
     """
     from tools.calibrate.board import make_board

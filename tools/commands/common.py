@@ -9,6 +9,8 @@ import typer
 
 from tools.request import Clocks, CpuClocks
 
+EXIT_NO_POSE = 1
+
 
 def flag(name: str, help: str) -> Any:
     """Describe an option that takes no value: its help names no type."""

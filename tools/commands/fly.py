@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tools.commands.common import ConfigOption, SourceOption, clocks_of, flag, tell_of_compiling
+from tools.commands.common import EXIT_NO_POSE, ConfigOption, SourceOption, clocks_of, flag, tell_of_compiling
 from tools.request import DemoRequest, FrameFormat, Pace, RunRequest
 from tracker.errors import OperatorError
 
@@ -42,7 +42,10 @@ def run(
     overwrite: Annotated[bool, flag("--overwrite", "Replace a log that exists.")] = False,
     quiet: Annotated[bool, flag("--quiet", "Show no status line and no summary.")] = False,
 ) -> None:
-    """Track the vehicle and send its pose to the autopilot; Ctrl-C ends it."""
+    """Track the vehicle and send its pose to the autopilot; Ctrl-C ends it.
+
+    Exit code 0: the source came to its end. 1: it did, and no pose was found in it. 130: interrupted.
+    """
     tell_of_compiling()
     from bridge.settings import config_path, load_settings
 
@@ -55,7 +58,8 @@ def run(
 
     from tools.session import run_session
 
-    run_session(request, clocks_of(context))
+    if not run_session(request, clocks_of(context)):
+        raise typer.Exit(EXIT_NO_POSE)
 
 
 def demo(

@@ -10,6 +10,7 @@ import typer
 
 from tools.commands.common import ConfigOption, JsonOption
 from tools.kept import keep
+from tools.suffix import check_suffix
 from tracker.errors import OperatorError
 
 MODELS = ("hover",)
@@ -41,6 +42,7 @@ def sysid(
             raise OperatorError(f"--config {config}: holds no [vehicle] sheet; add one (docs/sysid.md)")
     page = out or log.with_suffix(".sysid.html")
     keep((log,), page, "--out")
+    check_suffix(page, "--out", ".html")
     report = identify_log(log, read_log(log, sheet))
     try:
         page.write_text(report.to_html(), encoding="utf-8")
@@ -71,6 +73,7 @@ def excite(
     from tools.excite.plan_file import write_plan
 
     keep((config_path(config),), out, "--out")
+    check_suffix(out, "--out", ".toml")
     plan = make_plan(load_settings(config), sweep_s)
     write_plan(plan, out)
     picture = out.with_suffix(".png")

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from tools.commands.common import JsonOption, clocks_of, flag, tell_of_compiling
+from tools.commands.common import EXIT_NO_POSE, JsonOption, clocks_of, flag, tell_of_compiling
 from tools.request import ExportFormat, Pace, RunRequest
 
 
@@ -77,7 +77,10 @@ def replay(
     overwrite: Annotated[bool, flag("--overwrite", "Replace a log that exists.")] = False,
     quiet: Annotated[bool, flag("--quiet", "Show no status line and no summary.")] = False,
 ) -> None:
-    """Run the frames of a log through the tracker again; with its own settings it sends the same bytes."""
+    """Run the frames of a log through the tracker again; with its own settings it sends the same bytes.
+
+    Exit code 0: done. 1: done, and no pose was found.
+    """
     tell_of_compiling()
     from bridge.settings import config_path, load_settings
     from tools.replay import grounded, met_autopilot, settings_of
@@ -89,7 +92,9 @@ def replay(
     else:
         settings = grounded(settings, answered=pace is Pace.FAST and met_autopilot(log))
     own = None if config is None else config_path(config)
-    run_session(RunRequest(settings, f"log:{log}", out, pace, summary, overwrite, quiet, own), clocks_of(context))
+    request = RunRequest(settings, f"log:{log}", out, pace, summary, overwrite, quiet, own)
+    if not run_session(request, clocks_of(context)):
+        raise typer.Exit(EXIT_NO_POSE)
 
 
 def compare(

@@ -16,6 +16,7 @@ from tools.compare.picture import draw_comparison
 from tools.export.outfile import whole_or_absent
 from tools.kept import keep
 from tools.screen import screen
+from tools.suffix import check_suffix
 from tracker.sources.groundtruth import read_ground_truth
 from tracker.types import Array
 
@@ -27,10 +28,11 @@ def run_compare(a: Path, b: Path, truth: Path | None, out: Path | None, as_json:
 
     out: a PNG to draw, None for none.
     Raises:
-        OperatorError: a log or the truth that cannot be read, or no time in common.
+        OperatorError: a log or the truth that cannot be read, no time in common, or `out` is no name of a PNG.
     """
     reference = None if truth is None else path_of(read_ground_truth(truth))
     keep((a, b), out, "--out")
+    check_suffix(out, "--out", ".png")
     comparison = compare(read_flown(a), read_flown(b), reference)
     errors = screen(stderr=True, soft_wrap=True)
     for log, one in ((a, comparison.a), (b, comparison.b)):
@@ -114,12 +116,12 @@ def _print(figures: Figures) -> None:
         table.add_row(f"latency ms {name}", *cells, "")
     table.add_row("rejected", *(_cell(sum(one["rejected"].values())) for one in (a, b)), "")
     same = figures["same_mavlink_bytes"]
-    said = {True: "the same", False: "differ", None: "-"}[same]
-    table.add_row("MAVLink bytes", *(_cell(sum(one["sent"].values())) for one in (a, b)), said)
+    said = {True: "same bytes", False: "other bytes", None: "-"}[same]
+    table.add_row("messages sent", *(_cell(sum(one["sent"].values())) for one in (a, b)), said)
     screen().print(table)
 
 
 def _cell(value: float | None) -> str:
     if value is None:
         return "-"
-    return str(value) if isinstance(value, int) else f"{value:.3f}"
+    return str(value) if isinstance(value, int) else f"{value:z.3f}"

@@ -14,7 +14,10 @@ from tools.compare.figures import Comparison, Difference
 from tools.compare.flown import Flown
 
 _A, _B, _BETWEEN = "#1f4e79", "#d9722e", "#5b5b5b"
+_BELOW = 2.6  # points wide, so that A shows under a B that is the same
 NIS_OVER = 15  # estimates: of the running mean
+
+_Run = tuple[Flown, str, float, str]  # with its colour, its line's width and its name
 
 
 def draw_comparison(comparison: Comparison, path: Path) -> None:
@@ -25,17 +28,19 @@ def draw_comparison(comparison: Comparison, path: Path) -> None:
     figure.suptitle(f"A: {a.name}   B: {b.name}", fontsize=13, fontweight="bold")
     panels = figure.subplot_mosaic("PP;RR;NL")
     start_ns = int(min(a.path.t_ns[0], b.path.t_ns[0]))
-    lines = [("B less A", _BETWEEN, comparison.between)]
+    lines = [("B less A", _BETWEEN, 0.8, comparison.between)]
     if comparison.truths is not None:
-        lines = [("A less truth", _A, comparison.truths[0]), ("B less truth", _B, comparison.truths[1])]
-    for name, colour, one in lines:
+        of_a, of_b = comparison.truths
+        lines = [("A less truth", _A, _BELOW, of_a), ("B less truth", _B, 0.8, of_b)]
+    for name, colour, width, one in lines:
         seconds = (one.t_ns - start_ns) / 1e9
-        panels["P"].plot(seconds, one.distance_mm, ".-", color=colour, lw=0.8, ms=3, label=_label(name, one))
-        panels["R"].plot(seconds, np.degrees(one.turn_rad), ".-", color=colour, lw=0.8, ms=3, label=name)
+        panels["P"].plot(seconds, one.distance_mm, ".-", color=colour, lw=width, ms=3, label=_label(name, one))
+        panels["R"].plot(seconds, np.degrees(one.turn_rad), ".-", color=colour, lw=width, ms=3, label=name)
     for panel, title, unit in (("P", "position: distance", "mm"), ("R", "attitude: angle", "deg")):
         _dress(panels[panel], title, "time (s)", unit)
-    _nis(panels["N"], ((a, _A, "A"), (b, _B, "B")), start_ns)
-    _latency(panels["L"], ((a, _A, "A"), (b, _B, "B")))
+    runs = ((a, _A, _BELOW, "A"), (b, _B, 1.0, "B"))
+    _nis(panels["N"], runs, start_ns)
+    _latency(panels["L"], runs)
     figure.savefig(path, dpi=110, format="png")
 
 
@@ -44,23 +49,23 @@ def _label(name: str, one: Difference) -> str:
     return f"{name}: mean {one.distance_mm.mean():.2f} mm{lag}"
 
 
-def _nis(axes: Axes, runs: tuple[tuple[Flown, str, str], ...], start_ns: int) -> None:
+def _nis(axes: Axes, runs: tuple[_Run, ...], start_ns: int) -> None:
     axes.axhline(1.0, color="#bbbbbb", lw=1.0)
-    for one, colour, name in runs:
+    for one, colour, width, name in runs:
         used = one.nis_dof > 0
         ratio = one.nis[used] / one.nis_dof[used]
         if len(ratio):
             seconds = (one.path.t_ns[used] - start_ns) / 1e9
-            axes.plot(seconds, uniform_filter1d(ratio, min(NIS_OVER, len(ratio))), color=colour, lw=1.0, label=name)
+            axes.plot(seconds, uniform_filter1d(ratio, min(NIS_OVER, len(ratio))), color=colour, lw=width, label=name)
     _dress(axes, f"NIS per degree of freedom, mean of {NIS_OVER}", "time (s)", "")
 
 
-def _latency(axes: Axes, runs: tuple[tuple[Flown, str, str], ...]) -> None:
-    for one, colour, name in runs:
+def _latency(axes: Axes, runs: tuple[_Run, ...]) -> None:
+    for one, colour, width, name in runs:
         if len(one.latency_ms):
             ordered = np.sort(one.latency_ms)
             share = np.arange(1, len(ordered) + 1) / len(ordered)
-            axes.step(ordered, 100 * share, where="post", color=colour, lw=1.2, label=name)
+            axes.step(ordered, 100 * share, where="post", color=colour, lw=width, label=name)
             axes.set_xscale("log")
     _dress(axes, "latency, frame in memory to datagram", "ms", "% of poses not above")
 
@@ -73,4 +78,4 @@ def _dress(axes: Axes, title: str, x: str, y: str) -> None:
     axes.grid(color="#dddddd", linewidth=0.6)
     axes.set_axisbelow(True)
     if axes.get_legend_handles_labels()[0]:
-        axes.legend(fontsize=8, framealpha=0.9)
+        axes.legend(fontsize=8, frameon=False, loc="lower right", bbox_to_anchor=(1.0, 0.99), ncols=2, borderpad=0.0)

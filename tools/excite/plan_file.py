@@ -87,7 +87,9 @@ def read_plan(path: Path) -> Sequence:
     except ValidationError as error:
         first = error.errors(include_url=False)[0]
         place = ".".join(map(str, first["loc"]))
-        raise OperatorError(f"plan {path}: {place}: {first['msg']}; correct it") from error
+        raise OperatorError(
+            f"plan {path}: {place}: {first['msg']}; correct it, or `posebridge excite` makes a plan"
+        ) from error
     moves = (entry.model_dump(exclude={"excursion", "excursion_unit"}) for entry in file.manoeuvres)
     return Sequence(tuple(Manoeuvre(**move) for move in moves))
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from rich.console import Console
 
 from bridge.log.reader import LogReader
-from tools.export.export import ExportTerms, export
+from tools.export.export import ExportTerms, export, out_beside
 from tools.export.progress import progress
 from tools.export.report import to_text
 from tools.screen import screen
@@ -36,7 +36,7 @@ def run_export(log: Path, terms: ExportTerms, out: Path | None) -> None:
                 shutil.copyfileobj(file, sys.stdout.buffer)
             sys.stdout.flush()  # here, so that a reader who left, as `head` does, is noticed in time
         return
-    out = out or log.with_suffix(f".{terms.format}")
+    out = out or out_beside(log, terms.format)
     count = _write(log, terms, out, console)
     what = WHAT.get(terms.format, "estimates" if terms.rate_hz is None else "rows")
     console.print(f"{count} {what} written to {out}")

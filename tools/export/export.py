@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import glob
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,7 +17,7 @@ from tools.export.outfile import whole_or_absent
 from tools.export.report import Report, report_of, to_json
 from tools.export.survey import survey
 from tools.export.tlog import Topics, links_of, write_tlog
-from tools.kept import keep
+from tools.kept import are_one, keep
 from tracker.errors import OperatorError
 
 FORMATS = ("csv", "mat", "parquet", "tlog", "tum")
@@ -45,8 +47,12 @@ class ExportTerms:
         low, high = RATES_HZ
         if self.rate_hz is not None and not low <= self.rate_hz <= high:
             raise OperatorError(f"--rate_hz: {self.rate_hz:g} Hz must be {low:g} to {high:g} Hz; give a rate within")
-        if self.gap_ms is not None and (self.rate_hz is None or not self.gap_ms > 0):
-            raise OperatorError(f"--gap_ms: {self.gap_ms:g} ms must be positive, and needs --rate_hz; give both")
+        if self.gap_ms is not None and not self.gap_ms > 0:
+            raise OperatorError(f"--gap_ms: {self.gap_ms:g} ms must be positive; give a longer one")
+        if self.gap_ms is not None and self.rate_hz is None:
+            raise OperatorError(
+                f"--gap_ms: {self.gap_ms:g} ms: only rows at a fixed rate have gaps; give --rate_hz too"
+            )
         if self.format == "tlog" and self.rate_hz is not None:
             raise OperatorError("--rate_hz: a tlog holds messages as they were, at no fixed rate; leave it out")
 
@@ -68,10 +74,13 @@ def export(log_path: Path, terms: ExportTerms, out_path: Path, on_offset: OnOffs
         out_path: replaced once everything is written; a pipe or device is written as it goes.
         on_offset: told how far the log was read [bytes].
     Raises:
-        OperatorError: no readable log, nothing in it, no writable output, or the output is the log itself.
+        OperatorError: no readable log, nothing in it, no writable output, or the output is the log itself or a .tlog
+            that its flight wrote beside it.
     """
     reader = LogReader(log_path)
     keep((log_path,), out_path, "export")
+    if any(are_one(own, out_path) for own in _own_tlogs(log_path)):
+        raise OperatorError(f"export {out_path}: is what the flight itself wrote beside its log; name another file")
     if terms.rate_hz is not None:
         return _export_grid(reader, terms, terms.rate_hz, out_path, on_offset)
     with whole_or_absent(out_path) as path:
@@ -82,6 +91,20 @@ def export(log_path: Path, terms: ExportTerms, out_path: Path, on_offset: OnOffs
         else:
             count = tables.TABLES[terms.format](native.blocks(reader.records(_ESTIMATES, on_offset)), path)
     return Exported(count, reader.lost)
+
+
+def out_beside(log_path: Path, format: str) -> Path:
+    """Return where an export goes that nobody named: beside the log, not in the place of the flight's own .tlog."""
+    return log_path.with_suffix(".export.tlog" if format == "tlog" else f".{format}")
+
+
+def _own_tlogs(log_path: Path) -> Iterator[Path]:
+    """Yield the .tlog files that lie beside a log as its flight writes them, see `bridge.log.tlog.tlog_paths`."""
+    one = log_path.with_suffix(".tlog")
+    numbered = log_path.parent.glob(f"{glob.escape(log_path.stem)}.*.tlog")
+    for each in (one, *numbered):
+        if each.is_file() and (each == one or each.with_suffix("").suffix[1:].isdigit()):
+            yield each
 
 
 def _export_grid(

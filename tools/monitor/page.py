@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
-from rich.console import Group, RenderableType
+from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
+from rich.measure import Measurement
 from rich.table import Table
 from rich.text import Text
 
@@ -50,12 +52,27 @@ def figure(value: float | None, digits: int = 1) -> str:
     return "-" if value is None else f"{value:.{digits}f}"
 
 
-def _row(label: str, *parts: str | tuple[str, str] | Text, cut: bool = False, style: str = QUIET) -> Table:
-    """Put a label before a text, which goes on below itself where the window is narrow, or is cut there."""
+@dataclass(frozen=True, slots=True)
+class _Illustrated:
+    """A text, and bars behind it as far as its line has room for them."""
+
+    text: Text
+    bars: str
+
+    def __rich_console__(self, _: Console, options: ConsoleOptions) -> RenderResult:
+        room = max(0, options.max_width - self.text.cell_len)
+        yield Text.assemble(self.text, self.bars[:room])
+
+    def __rich_measure__(self, _: Console, options: ConsoleOptions) -> Measurement:
+        return Measurement(1, min(options.max_width, self.text.cell_len + len(self.bars)))
+
+
+def _row(label: str, *parts: str | tuple[str, str] | Text, bars: str = "", style: str = QUIET) -> Table:
+    """Put a label before a text, which goes on below itself where the window is narrow, and bars behind it."""
     row = Table.grid()
     row.add_column(min_width=LABEL, no_wrap=True)
-    row.add_column(no_wrap=cut, overflow="ellipsis" if cut else "fold")
-    row.add_row(Text(label, style), Text.assemble(*parts))
+    row.add_column(overflow="fold")
+    row.add_row(Text(label, style), _Illustrated(Text.assemble(*parts), bars))
     return row
 
 
@@ -109,8 +126,7 @@ def _rate(snapshot: Snapshot, glyphs: str) -> Table:
         f" (mean {rate.mean_hz:.1f}, needed {rate.need_hz:g}), ",
         f"gap {figure(rate.gap_recent_ms, 0)} ms (ever {figure(rate.gap_ever_ms, 0)}), ",
         f"age {figure(rate.age_ms, 0)} ms ",
-        bars(snapshot.history.poses, BARS // 2, glyphs),
-        cut=True,
+        bars=bars(snapshot.history.poses, BARS // 2, glyphs),
     )
 
 
@@ -136,13 +152,17 @@ def _latency(snapshot: Snapshot, glyphs: str) -> Table:
     table.add_column("latency, ms", no_wrap=True)
     for column in ("p50", "p95", "p99", "max"):
         table.add_column(column, justify="right", no_wrap=True)
-    table.add_column(f"{EDGES_MS[0]:g} ms .. {EDGES_MS[-1] / 1e3:g} s", no_wrap=True)
+    table.add_column(_cropped(f"{EDGES_MS[0]:g} ms .. {EDGES_MS[-1] / 1e3:g} s"))  # it alone gives way
     for stage in (*snapshot.latency.stages, snapshot.latency.total):
-        table.add_row(*_figures(stage), bars(stage.counts, BARS, glyphs))
-    history = bars(snapshot.history.latency_ms, BARS, glyphs)
+        table.add_row(*_figures(stage), _cropped(bars(stage.counts, BARS, glyphs)))
+    history = _cropped(bars(snapshot.history.latency_ms, BARS, glyphs))
     recent = (figure(snapshot.latency.recent_p50_ms, 2), "", figure(snapshot.latency.recent_p99_ms, 2), "")
     table.add_row("now; by second", *recent, history)
     return table
+
+
+def _cropped(line: str) -> Text:
+    return Text(line, no_wrap=True, overflow="crop")
 
 
 def _figures(stage: Stage) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from rich.console import Group, RenderableType
+from rich.table import Table
 from rich.text import Text
 
 from bridge.alarms import Alarm, Level
@@ -56,15 +57,20 @@ def table(episodes: tuple[Episode, ...]) -> RenderableType:
     """Lay the alarms of a flight out, a line each."""
     if not episodes:
         return Text("No alarm on the way.", "green")
-    lines = [Text(f"{len(episodes)} alarms on the way, by the time in the flight:", "bold")]
+    count = "1 alarm" if len(episodes) == 1 else f"{len(episodes)} alarms"
+    rows = Table.grid(padding=(0, 1, 0, 0))
+    rows.add_column(no_wrap=True)
+    rows.add_column(no_wrap=True)
+    rows.add_column(overflow="fold")
     for episode in episodes[:SHOWN]:
         alarm = episode.alarm
         style = "bold red" if alarm.level is Level.ALARM else "yellow"
-        lines.append(
-            Text.assemble(
-                f"{episode.from_s:8.1f} s to {episode.until_s:8.1f} s  ", (f"{alarm.level:<8}", style), alarm.cause
-            )
+        rows.add_row(
+            f"{episode.from_s:8.1f} s to {episode.until_s:8.1f} s", Text(alarm.level, style), Text(alarm.cause)
         )
-    if len(episodes) > SHOWN:
-        lines.append(Text(f"and {len(episodes) - SHOWN} more; --json has them all", "dim"))
-    return Group(*lines)
+    more = len(episodes) - SHOWN
+    return Group(
+        Text(f"{count} on the way, by the time in the flight:", "bold"),
+        rows,
+        *([Text(f"and {more} more; --json has them all", "dim")] if more > 0 else ()),
+    )

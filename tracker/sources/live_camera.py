@@ -49,6 +49,11 @@ class LiveCamera:
             raise OperatorError(
                 f"camera {self.name}: latency_ms {self.latency_ms:g} must be 0 to {MAX_LATENCY_MS:g}; measure it again"
             )
+        if self.fps is not None and self.exposure_ms is not None and self.exposure_ms > 1e3 / self.fps:
+            raise OperatorError(
+                f"camera {self.name}: exposure_ms {self.exposure_ms:g} must be at most {1e3 / self.fps:.4g} at "
+                f"{self.fps:g} frames a second; it is in milliseconds: correct it, or the frame rate"
+            )
         if self.fourcc is not None and len(self.fourcc) != 4:
             raise OperatorError(f"camera {self.name}: fourcc {self.fourcc!r} must be four letters, such as MJPG")
 

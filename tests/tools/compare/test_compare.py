@@ -124,3 +124,5 @@ def test_the_command_prints_the_figures_and_draws_them(tmp_path: Path, capsys: p
     assert picture.std() > 10
     run_compare(a, b, None, None, as_json=False)
     assert "error mean mm" in capsys.readouterr().out
+    run_compare(a, a, None, None, as_json=False)
+    assert "-0.000" not in capsys.readouterr().out

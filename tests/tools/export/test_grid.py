@@ -224,8 +224,8 @@ def test_a_log_without_estimates_has_the_autopilots_columns_and_no_trajectory(tm
     [
         (("csv", 0.0), "--rate_hz: 0 Hz must be 0.1 to 2000 Hz"),
         (("csv", float("nan")), "--rate_hz: nan Hz must be"),
-        (("csv", None, 50.0), "needs --rate_hz"),
-        (("csv", 10.0, -1.0), "must be positive"),
+        (("csv", None, 50.0), "50 ms: only rows at a fixed rate have gaps; give --rate_hz too"),
+        (("csv", 10.0, -1.0), "-1 ms must be positive"),
         (("tlog", 10.0), "leave it out"),
     ],
 )

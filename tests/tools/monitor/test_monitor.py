@@ -16,6 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.console import Console
 
+from bridge.alarms import Alarm, Level
 from bridge.telemetry.post import HOST, Post
 from bridge.telemetry.snapshot import to_bytes
 from bridge.telemetry.states import Surroundings
@@ -26,7 +27,7 @@ from tools.cli import run_command_line
 from tools.monitor.attach import attach
 from tools.monitor.bars import BLOCKS, PLAIN, bars
 from tools.monitor.page import page
-from tools.monitor.review import review
+from tools.monitor.review import Episode, review, table
 from tracker.types import TrackState
 
 SECOND_NS = 1_000_000_000
@@ -150,6 +151,24 @@ def test_a_log_is_shown_with_every_alarm_on_the_way(tmp_path: Path, capsys: pyte
     assert gap.from_s == pytest.approx(150 / 30 + 0.3, abs=0.4)
 
 
+def test_one_alarm_is_counted_as_one() -> None:
+    one = Episode(Alarm("gap", "", Level.ALARM, "a gap", "mend it", 1.0), 2.0, 3.0)
+    for episodes, words in (((one,), "1 alarm on the way"), ((one, one), "2 alarms on the way")):
+        console = Console(width=80)
+        with console.capture() as shown:
+            console.print(table(episodes))
+        assert words in shown.get()
+
+
+def test_what_an_alarm_says_goes_on_below_itself() -> None:
+    console = Console(width=60)
+    with console.capture() as shown:
+        console.print(table((Episode(Alarm("gap", "", Level.ALARM, "word " * 20, "mend it", 1.0), 2.0, 3.0),)))
+    below = shown.get().splitlines()[2]
+    assert below.startswith(" " * 20)
+    assert below.split()[0] == "word"
+
+
 def test_the_page_fits_eighty_columns_whatever_the_names() -> None:
     watched = Watched(around=Surroundings((LinkState("serial:/dev/" + "x" * 90, False, "gone " * 30, 1, 2, 3),)))
     watched.fly(*turns(200))
@@ -160,6 +179,19 @@ def test_a_narrow_window_breaks_what_links_say_and_cuts_none_of_it() -> None:
     watched = Watched(around=Surroundings((LinkState("serial:/dev/ttyACM0:921600", False, "gone " * 9, 1, 2, 3),)))
     watched.fly(*turns(200))
     assert ", 1 sent, 2 dropped, 3 superseded" in " ".join(drawn(watched, 60).split())
+
+
+@pytest.mark.parametrize("width", [50, 60, 80, 120])
+def test_no_window_is_too_narrow_for_a_figure(width: int) -> None:
+    watched = Watched()
+    watched.fly(*turns(200))
+    lines = [line for line in drawn(watched, 200).splitlines() if line.startswith(("frame to datagram", "rate"))]
+    figures = [word for line in lines for word in line.split() if any(letter.isdigit() for letter in word)]
+    assert len(figures) > 8
+    _, *below = drawn(watched, width).splitlines()
+    assert "…" not in "".join(below)
+    assert max(map(len, below)) <= width
+    assert set(figures) <= set(" ".join(below).split())
 
 
 def test_without_unicode_the_page_is_plain_ascii() -> None:

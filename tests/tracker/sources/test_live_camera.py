@@ -127,6 +127,10 @@ def test_what_the_device_refuses_is_told_and_the_rest_is_set() -> None:
         (lambda: LiveCamera("0", "left", fps=0.0), "fps 0 must be positive"),
         (lambda: LiveCamera("0", "left", exposure_ms=-4.0), "exposure_ms -4 must be positive"),
         (lambda: LiveCamera("0", "left", exposure_ms=float("nan")), "exposure_ms nan must be positive"),
+        (
+            lambda: LiveCamera("0", "left", fps=30.0, exposure_ms=4000.0),
+            "camera left: exposure_ms 4000 must be at most 33.33 at 30 frames a second",
+        ),
         (lambda: LiveCamera("0", "left", width_px=0), "width_px 0 must be positive"),
         (lambda: LiveCamera("0", "left", latency_ms=-1.0), "latency_ms -1 must be 0 to 1000"),
         (lambda: LiveCamera("0", "left", latency_ms=1e6), "must be 0 to 1000"),
