@@ -48,12 +48,12 @@ def _at_once(
 
     Arguments as `compared`, `distances2` and `prepared` take them; limit: of a sighting's squared distance.
     """
-    y, R, A, B, path, doubt = compared(
+    y, H, R, A, B, path, doubt = compared(
         mean, P, P_coasted, dt, T, z, covs_px, noise, cameras, balls, lags_s, table, points_inB, False
     )
     near = True
     for distance2 in distances2(y, A, B, tops):
         near = near and distance2 <= limit
-    levels, P, R, doubtful = prepared(levels, of, y, A, B, R, path, doubt, P_coasted, dt, T, tilt, True, False)
+    levels, P, R, doubtful = prepared(levels, of, y, H, A, B, R, path, doubt, P_coasted, dt, T, tilt, True, False)
     stands, turn_open, dx, H, u, inverse, nis = solved(mean, P, T, z, R, cameras, balls, lags_s, table, points_inB)
     return near and stands and not (doubtful or turn_open), levels, P, dx, H, R, u, inverse, nis

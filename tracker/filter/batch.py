@@ -63,7 +63,7 @@ class Batch(NamedTuple):
     """Sightings, and what a prediction says of them.
 
     R (2n, 2n): the noise of fit and camera.
-    y (2n,): the prediction's innovation.  A (2n, 2n): its covariance without any manoeuvre.
+    y (2n,): the prediction's innovation.  H (2n, size): its slope.  A (2n, 2n): its covariance without any manoeuvre.
     B (s, 2n, 2n): what each strength of 1 adds to it, (s,) as `process_noise` takes them.
     path (s, 2n, 2n): the part of B that lies between the state's time and the cameras'.
     doubt (2n, 2n): unknown speed times unknown clock offset, part of A.
@@ -73,6 +73,7 @@ class Batch(NamedTuple):
     sighted: Sighted
     R: Array
     y: Array
+    H: Array
     A: Array
     B: Array
     path: Array
@@ -86,8 +87,9 @@ class Batch(NamedTuple):
         rows = _rows_of(kept)
         square = (..., rows[:, None], rows)
         return Batch(
-            self.sighted.part(kept), self.R[square], self.y[rows], self.A[square], np.ascontiguousarray(self.B[square]),
-            np.ascontiguousarray(self.path[square]), self.doubt[square], self.tops,
+            self.sighted.part(kept), self.R[square], self.y[rows], self.H[rows], self.A[square],
+            np.ascontiguousarray(self.B[square]), np.ascontiguousarray(self.path[square]), self.doubt[square],
+            self.tops,
         )  # fmt: skip
 
     def distances2(self) -> list[float]:
@@ -105,11 +107,11 @@ def _rows_of(kept: list[int]) -> Indices:
 def make_batch(ahead: Prediction, seen: Sighted, rig: Rig) -> Batch:
     """Compare sightings with a prediction. A ball predicted behind its camera has NaN for an innovation."""
     state, T = ahead.state, ahead.process.manoeuvre_s
-    y, R, A, B, path, doubt = compared(
+    y, H, R, A, B, path, doubt = compared(
         state.mean, state.P, ahead.P_coasted, ahead.dt, T, seen.z, seen.covs_px, state.noise, seen.cameras, seen.balls,
         seen.lags_s, camera_table(rig), ahead.points_of(rig), ahead.turn_open,
     )  # fmt: skip
-    return Batch(seen, R, y, A, B, path, doubt, envelope(ahead.process))
+    return Batch(seen, R, y, H, A, B, path, doubt, envelope(ahead.process))
 
 
 @compiled("f8[::1](f8[::1], f8[:, ::1], f8[:, :, ::1], f8[::1])")
@@ -176,14 +178,14 @@ def _covariances(
     return R, innovation_covariance(H, P, R + doubt), B, path, doubt
 
 
-@compiled("Tuple((f8[::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1]))"
+@compiled("Tuple((f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1]))"
           "(f8[::1], f8[:, ::1], f8[:, ::1], f8, f8, f8[::1], f8[:, ::1], f8[:, ::1], i8[::1], i8[::1], f8[::1],"
           " f8[:, ::1], f8[:, ::1], b1)")  # fmt: skip
 def compared(
     mean: Array, P: Array, P_coasted: Array, dt: float, T: float, z: Array, covs_px: Array, noise: Array,
     cameras: Indices, balls: Indices, lags_s: Array, table: Array, points_inB: Array, turn_open: bool,
-) -> tuple[Array, Array, Array, Array, Array, Array]:  # fmt: skip
-    """Return y, R, A, B, path and doubt of a `Batch`.
+) -> tuple[Array, Array, Array, Array, Array, Array, Array]:  # fmt: skip
+    """Return y, H, R, A, B, path and doubt of a `Batch`.
 
     Args:
         mean, P, P_coasted, dt, turn_open: of the `Prediction`.  z, cameras, balls, lags_s: the batch's.
@@ -196,4 +198,4 @@ def compared(
     R, A, B, path, doubt = _covariances(H, P_coasted, dt, T, covs_px, noise, cameras, true_lags_s)
     if turn_open:
         A += sag_noise(H, balls, points_inB, mean, P)
-    return z - h, R, A, B, path, doubt
+    return z - h, H, R, A, B, path, doubt

@@ -68,8 +68,8 @@ def fit(ahead: Prediction, batch: Batch, rig: Rig, *, adapt: bool = True) -> Fit
     """
     process, n = ahead.process, len(batch.y)
     levels, P, R, doubtful = prepared(
-        ahead.state.levels, manoeuvre.strengths(process), batch.y, batch.A, batch.B, batch.R, batch.path, batch.doubt,
-        ahead.P_coasted, ahead.dt, process.manoeuvre_s, tilt_variance(ahead), adapt, ahead.turn_open,
+        ahead.state.levels, manoeuvre.strengths(process), batch.y, batch.H, batch.A, batch.B, batch.R, batch.path,
+        batch.doubt, ahead.P_coasted, ahead.dt, process.manoeuvre_s, tilt_variance(ahead), adapt, ahead.turn_open,
     )  # fmt: skip
     agreed = None if doubtful and _clock_open(batch) else _fitted(ahead, batch, rig, levels, P, R)
     if not doubtful:
@@ -87,9 +87,10 @@ def tilt_variance(ahead: Prediction) -> float:
 
 
 @compiled("Tuple((f8[:, ::1], f8[:, ::1], f8[:, ::1], b1))(f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1],"
-          " f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8, f8, f8, b1, b1)")  # fmt: skip
+          " f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8, f8, f8, b1,"
+          " b1)")  # fmt: skip
 def prepared(
-    levels: Array, of: Array, y: Array, A: Array, B: Array, R_pixels: Array, path: Array, doubt: Array,
+    levels: Array, of: Array, y: Array, H: Array, A: Array, B: Array, R_pixels: Array, path: Array, doubt: Array,
     P_coasted: Array, dt: float, T: float, tilt: float, adapt: bool, unseen: bool,
 ) -> tuple[Array, Array, Array, bool]:  # fmt: skip
     """Return levels, prior covariance, noise of pixels and tilt, and whether the doubt of the clocks matters.
@@ -103,7 +104,7 @@ def prepared(
         before, levels = levels, judged(levels, log_likelihoods(y, A, B, of, expected(levels, of)))
         if unseen and expected(levels, of)[1] < expected(before, of)[1]:
             levels[1] = before[1]
-    means = as_gained(levels, of, A, B)
+    means = as_gained(levels, of, H, A, B, dt, T)
     R, noise, doubts = np.zeros((n + TILT_ROWS, n + TILT_ROWS)), 0.0, 0.0
     for i in range(n):
         for j in range(n):

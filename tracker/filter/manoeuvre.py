@@ -16,9 +16,8 @@ from functools import lru_cache
 import numpy as np
 
 from tracker.filter.correction import inverse_of
-from tracker.filter.matern import KINDS, MOTIONS
+from tracker.filter.matern import KINDS, MOTIONS, unit_noise
 from tracker.maths.compiled import compiled
-from tracker.maths.solve import dot
 from tracker.state import Process
 from tracker.types import Array
 
@@ -140,31 +139,57 @@ def expected(levels: Array, of: Array) -> Array:
     return means
 
 
-@compiled("f8[::1](f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1])")
-def as_gained(levels: Array, of: Array, A: Array, B: Array) -> Array:
+@compiled("f8(f8[:, ::1], f8[:, ::1], i8)")
+def _least_seen(inverse: Array, H: Array, motion: int) -> float:
+    """Return the information of pixels on the place or the turn along the axis that they show least [1/m^2, 1/rad^2].
+
+    inverse (n, n): of the innovations' covariance.  H (n, size): their slope.
+    Source: the harmonic mean of the eigenvalues of H' S^-1 H (3, 3), which is near the least where one is small.
+    """
+    M, first = np.zeros((AXES, AXES)), AXES * motion
+    for i in range(len(H)):
+        for j in range(len(H)):
+            for a in range(AXES):
+                for b in range(AXES):
+                    M[a, b] += H[i, first + a] * inverse[i, j] * H[j, first + b]
+    pairs = cubes = 0.0  # the sum of the products of two eigenvalues, and the product of all
+    for a in range(AXES):
+        b, c = (a + 1) % AXES, (a + 2) % AXES
+        pairs += M[b, b] * M[c, c] - M[b, c] * M[c, b]
+        cubes += M[0, a] * (M[1, b] * M[2, c] - M[1, c] * M[2, b])
+    return max(0.0, AXES * cubes / pairs) if pairs > 0.0 else 0.0
+
+
+@compiled("f8[::1](f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8, f8)")
+def as_gained(levels: Array, of: Array, H: Array, A: Array, B: Array, dt: float, T: float) -> Array:
     """Return the strengths (KINDS * MOTIONS,) with which one update gains what the levels' own gain in the mean.
 
-    levels, of: as for `expected`, after the pixels.  A, B: as for `log_likelihoods`.
+    Args:
+        levels, of: as for `expected`, after the pixels.
+        H (n, size): slope of the innovations.  A, B: as for `log_likelihoods`, the other motion at its mean.
+        dt, T: as for `unit_noise`.
     Source: of an innovation with variance a that a manoeuvre of strength s raises by b s, the update takes the share
         w(s) = b s / (a + b s) for the manoeuvre and leaves it the variance s (1 - w) = (a / b) w. Both are linear in
         w: mean and variance of the levels' mixture, but for how far their means lie apart, are those of the one
         strength whose w is the mean of w. The mean strength gains more, since w is concave, and leaves the state
-        less sure than it is. b / a is the trace of A^-1 B over the motion's axes.
+        less sure than it is; where pixels show nothing, b = 0, it is the right one. So b / a is that of the axis that
+        they show least.
     """
-    means, inverse = expected(levels, of), inverse_of(A)
+    means, unit = expected(levels, of), unit_noise(dt, T)
+    found = means.copy()
     for motion in range(MOTIONS):
-        b = np.zeros(KINDS)
-        for kind in range(KINDS):
-            for i in range(len(inverse)):
-                b[kind] += dot(inverse[i], B[kind * MOTIONS + motion, i]) / AXES
-        raised = gained = 0.0
+        S = A.copy()
+        for k in range(len(B)):
+            if k % MOTIONS != motion:
+                S += means[k] * B[k]
+        seen, raised, gained = _least_seen(inverse_of(S), H, motion), 0.0, 0.0
         for level in range(levels.shape[1]):
             bs = 0.0
             for kind in range(KINDS):
-                bs += of[kind * MOTIONS + motion, level] * b[kind]
+                bs += of[kind * MOTIONS + motion, level] * unit[kind, 0, 0] * seen
             raised += levels[motion, level] * bs
             gained += levels[motion, level] * bs / (1.0 + bs)
         if raised > 0.0:
             for kind in range(KINDS):
-                means[kind * MOTIONS + motion] *= gained / (1.0 - gained) / raised
-    return means
+                found[kind * MOTIONS + motion] *= gained / (1.0 - gained) / raised
+    return found

@@ -21,7 +21,7 @@ from tracker.filter.manoeuvre import (
     start_levels,
     strengths,
 )
-from tracker.filter.matern import KINDS, MOTIONS, process_noise
+from tracker.filter.matern import KINDS, MOTIONS, process_noise, unit_noise
 from tracker.filter.measure import predicted_pixels
 from tracker.filter.predict import predict
 from tracker.types import Array
@@ -65,41 +65,54 @@ def test_each_strength_adds_its_process_noise_to_the_innovation(strength: int) -
     assert np.allclose(batch.B[strength] - batch.path[strength], H @ Q @ H.T)
 
 
+T, DT = PROCESS.manoeuvre_s, 0.067
+UNIT = unit_noise(DT, T)[:, 0, 0]
+NOTHING = np.zeros((KINDS * MOTIONS, 6, 6))  # of one motion in the other's pixels
+
+
 def shown(seed: int) -> tuple[Array, Array]:
-    """Return A (6, 6) and B (KINDS * MOTIONS, 6, 6) of which each adds to three axes of its motion alone."""
+    """Return H (6, 25) and A (6, 6) of pixels each of which shows one axis of a motion, all of one as well."""
     rng = np.random.default_rng(seed)
-    B = np.zeros((KINDS * MOTIONS, 6, 6))
-    for k in range(len(B)):
-        own = slice(AXES * (k % MOTIONS), AXES * (k % MOTIONS + 1))
-        B[k, own, own] = np.eye(AXES) * rng.uniform(0.1, 3.0)
-    return np.eye(6) * rng.uniform(0.5, 2.0), B
+    H = np.zeros((6, 25))
+    H[:, :6] = np.diag(np.repeat(rng.uniform(10.0, 1000.0, MOTIONS), AXES))
+    return H, np.eye(6) * rng.uniform(0.5, 2.0)
 
 
-def gain(A: Array, B: Array, strengths: Array, motion: int) -> float:
+def gain(A: Array, H: Array, strengths: Array, motion: int) -> float:
     """Return the share of an innovation along one of a motion's axes that an update takes for the manoeuvre's."""
     axis = AXES * motion
-    raised = float(strengths[motion::MOTIONS] @ B[motion::MOTIONS, axis, axis])
-    return raised / (float(A[axis, axis]) + raised)
+    raised = H[axis, axis] ** 2 * (strengths[motion::MOTIONS] @ UNIT)
+    return float(raised / (A[axis, axis] + raised))
+
+
+def some_levels(seed: int) -> Array:
+    return np.random.default_rng(seed).dirichlet(np.full(LEVELS, 0.5), MOTIONS)
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_one_update_gains_what_the_levels_own_updates_gain_in_the_mean(seed: int) -> None:
-    A, B = shown(seed)
-    levels = np.random.default_rng(seed).dirichlet(np.full(LEVELS, 0.5), MOTIONS)
-    one = as_gained(levels, OF, A, B)
+    (H, A), levels = shown(seed), some_levels(seed)
+    one = as_gained(levels, OF, H, A, NOTHING, DT, T)
     for motion in range(MOTIONS):
-        each = [gain(A, B, OF[:, level], motion) for level in range(LEVELS)]
-        assert gain(A, B, one, motion) == pytest.approx(levels[motion] @ each)
-    assert (one <= expected(levels, OF) * (1.0 + 1e-12)).all()
+        each = [gain(A, H, OF[:, level], motion) for level in range(LEVELS)]
+        assert gain(A, H, one, motion) == pytest.approx(levels[motion] @ each)
+    assert (one < expected(levels, OF)).all()
+
+
+@pytest.mark.parametrize("axis", range(AXES))
+def test_where_an_axis_is_not_seen_the_mean_strength_stands(axis: int) -> None:
+    """It alone says how far the vehicle may have gone there."""
+    (H, A), levels = shown(1), some_levels(1)
+    H[:, [axis, AXES + axis]] = 0.0
+    assert np.allclose(as_gained(levels, OF, H, A, NOTHING, DT, T), expected(levels, OF))
 
 
 @pytest.mark.parametrize("level", range(LEVELS))
 def test_a_level_that_is_certain_keeps_its_strength(level: int) -> None:
     levels = np.zeros((MOTIONS, LEVELS))
     levels[:, level] = 1.0
-    assert np.allclose(as_gained(levels, OF, *shown(level)), OF[:, level])
+    assert np.allclose(as_gained(levels, OF, *shown(level), NOTHING, DT, T), OF[:, level])
 
 
 def test_without_time_for_a_manoeuvre_the_mean_strength_stands() -> None:
-    A, B = shown(1)
-    assert np.array_equal(as_gained(start_levels(), OF, A, np.zeros_like(B)), expected(start_levels(), OF))
+    assert np.array_equal(as_gained(start_levels(), OF, *shown(1), NOTHING, 0.0, T), expected(start_levels(), OF))
