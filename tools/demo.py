@@ -23,6 +23,7 @@ from bridge.status import StatusLine
 from bridge.summary import Summary, to_text
 from bridge.wire import Sent
 from tools.demo_plot import draw_flight
+from tools.kept import keep_flight
 from tools.request import Clocks, DemoRequest, Pace
 from tools.screen import screen
 from tools.seen_picture import draw_seen
@@ -41,6 +42,7 @@ from tracker.sources.paths import Pose, Vehicle
 from tracker.sources.sim import START_NS, SimSource, SimTiming
 from tracker.types import Estimate, Event, Frame, Step
 
+SOURCE = "demo"
 LOG, SUMMARY, VERDICT, PLOT, SEEN = "flight.mcap", "summary.json", "verdict.json", "flight.png", "seen.png"
 DEMO_CONFIG = "lab"
 _RATE_HZ = 15.0
@@ -161,18 +163,19 @@ def fly(
     rig = rig_of(settings, None).rig
     timing = SimTiming(_RATE_HZ, request.duration_s + _TALK_S, START_NS, delay_ns=world.surroundings.delay_ns)
     log = request.out / LOG
+    keep_flight(log, SOURCE)
     with ExitStack() as stack:
         source = stack.enter_context(SimSource(rig, world, clocks.stopwatch, timing, seed=request.seed))
         halfway_ns = START_NS + round(request.duration_s / 2.0 * 1e9)
         witness = _Witness(tracker_of(settings, rig, clocks), world, rig, halfway_ns)
         outlet = links_of(settings, clocks, logged=True)
         stack.callback(outlet.close)
-        about = {"source": "demo", "pace": request.pace.value, "seed": str(request.seed)}
+        about = {"source": SOURCE, "pace": request.pace.value, "seed": str(request.seed)}
         fast = request.pace is Pace.FAST
         recorder = recorder_of(log, settings, rig, about, clocks, overwrite=True, block_when_full=fast)
         monitor = _WatchedMonitor(tuple(camera.name for camera in rig.cameras), witness)
         status = stack.enter_context(StatusLine(console, clocks.stopwatch))
-        telemetry = telemetry_of("demo", settings, rig, monitor, clocks)
+        telemetry = telemetry_of(SOURCE, settings, rig, monitor, clocks)
         outlets = Outlets(outlet, monitor, recorder, status, telemetry)
         stack.enter_context(steady())
         delay_ns = world.surroundings.delay_ns

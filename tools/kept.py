@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from bridge.log.reader import LogReader
 from tracker.errors import OperatorError
 
 
@@ -20,6 +21,22 @@ def keep(inputs: tuple[Path, ...], out: Path | None, what: str) -> None:
     for each in inputs:
         if out is not None and are_one(each, out):
             raise OperatorError(f"{what} {out}: this command goes by that file, which is kept; name another")
+
+
+def keep_flight(log: Path, source: str) -> None:
+    """Refuse to replace a log that is there already, unless it is one of the same source, or empty.
+
+    Args:
+        log: where a log is to be written without asking.
+        source: what the logs that may be replaced were recorded from, as they themselves say.
+    Raises:
+        OperatorError: the log of another flight, or a file that is no log.
+    """
+    if not log.is_file() or not log.stat().st_size:
+        return
+    flown = LogReader(log).metadata().get("run", {}).get("source", "nobody knows what")
+    if flown != source:
+        raise OperatorError(f"log {log}: is of another flight ({flown}) and is kept; name another folder")
 
 
 def are_one(one: Path, other: Path) -> bool:

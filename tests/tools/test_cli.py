@@ -154,6 +154,14 @@ def test_a_log_that_is_not_there_cannot_be_exported(tmp_path: Path) -> None:
     assert "gone.mcap" in refusal("export", tmp_path / "gone.mcap", "--format", "tum")
 
 
+@pytest.mark.parametrize(
+    "command", ["export . --format csv", "export / --format tlog", "sysid .", "monitor .", "replay ."]
+)
+def test_a_folder_in_place_of_a_log_is_refused(command: str) -> None:
+    arguments = command.split()
+    assert refusal(*arguments) == f"log {arguments[1]}: is no regular file; name a log file"
+
+
 def test_a_table_goes_beside_the_log_or_to_stdout(tmp_path: Path) -> None:
     log = tmp_path / "flight.mcap"
     record(log, turns(20))

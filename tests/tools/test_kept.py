@@ -10,7 +10,7 @@ import pytest
 from bridge.settings import shipped_configs
 from tests.bridge.recordings import record, turns
 from tools.cli import EXIT_OPERATOR, run_command_line
-from tools.kept import keep
+from tools.kept import keep, keep_flight
 from tracker.errors import OperatorError
 
 KEPT = "this command goes by that file, which is kept; name another"
@@ -75,6 +75,22 @@ def test_a_summary_does_not_take_the_place_of_its_log(tmp_path: Path, capsys: py
     both = str(tmp_path / "flight.mcap")
     assert run_command_line(["run", "--source", "sim:hover", "--log", both, "--summary", both]) == EXIT_OPERATOR
     assert "--summary" in capsys.readouterr().err
+
+
+def test_a_demo_does_not_take_the_place_of_a_flight(log: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    before = log.read_bytes()
+    assert run_command_line(["demo", "--duration_s", "15", "--out", str(log.parent)]) == EXIT_OPERATOR
+    assert capsys.readouterr().err.endswith(
+        f"log {log}: is of another flight (recording:somewhere) and is kept; name another folder\n"
+    )
+    assert log.read_bytes() == before
+
+
+@pytest.mark.parametrize("share", [0.0, 0.5, 1.0])
+def test_a_log_of_the_same_source_may_be_replaced_however_it_ended(log: Path, share: float) -> None:
+    log.write_bytes(log.read_bytes()[: round(share * log.stat().st_size)])
+    keep_flight(log, "recording:somewhere")
+    keep_flight(log.with_name("none.mcap"), "recording:somewhere")
 
 
 def test_another_way_to_the_same_file_is_seen_and_a_device_is_none(tmp_path: Path) -> None:

@@ -31,10 +31,12 @@ def sysid(
     """Find the vehicle's model from a log: parameters with their errors, and a report with pictures."""
     if model not in MODELS:
         raise OperatorError(f"--model {model}: unknown; known are {', '.join(MODELS)}")
+    from bridge.log.reader import LogReader
     from bridge.settings import load_settings
     from tools.sysid.log_data import read_log
     from tools.sysid.session import identify_log, to_table
 
+    LogReader(log)  # says what is wrong with it, before a file is named by it
     sheet = None
     if config is not None:
         sheet = load_settings(config).vehicle

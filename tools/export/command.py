@@ -26,6 +26,7 @@ def run_export(log: Path, terms: ExportTerms, out: Path | None) -> None:
     Raises:
         OperatorError: see `export`.
     """
+    LogReader(log)  # says what is wrong with it, before anything is shown
     console = screen(stderr=True, soft_wrap=True)
     if not console.is_terminal:
         console = screen(stderr=True, soft_wrap=True, width=WIDTH)
@@ -43,7 +44,6 @@ def run_export(log: Path, terms: ExportTerms, out: Path | None) -> None:
 
 
 def _write(log: Path, terms: ExportTerms, path: Path, console: Console) -> int:
-    LogReader(log)  # says what is wrong with it, before anything is shown
     with progress(console, log.stat().st_size, 1 if terms.rate_hz is None else 2) as on_offset:
         done = export(log, terms, path, on_offset)
     if done.alignment is not None:
