@@ -41,7 +41,7 @@ def _none_sent(watch: PoseWatch, holding: str) -> Line:
     if not watch.estimates:
         fix = "the tracker finds no marker: run posebridge colours, and see that all balls are in both pictures"
         return Line(Mark.FAIL, what, f"none, the track is {watch.state.value}", needed, fix)
-    fix = "they are too old when they could leave: see max_age_ms, latency_ms of the cameras, and this computer's load"
+    fix = "too old when they could leave: see max_age_ms, lag_rounds, the cameras' latency_ms, and this computer's load"
     return Line(Mark.FAIL, what, f"none of {watch.estimates} estimates left", needed, fix)
 
 
