@@ -15,7 +15,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tracker.image.harmonics import TERMS, turned
+from tracker.image.harmonics import LAMBERT, TERMS, turned
 from tracker.image.lamps import explained
 from tracker.image.template import GLOSS, Shades, Vector
 from tracker.maths.compiled import compiled
@@ -74,6 +74,14 @@ class Light:
         except RuntimeError:  # the search for lamps did not end: the light known before serves on
             return self
         return replace(self, lamp=lamp, terms=terms)
+
+    def apart_from(self, other: Light) -> float:
+        """Return by how much two lights differ, rms over all directions a ball's surface may face, their mean being 1.
+
+        Source: the harmonics are orthogonal, and the mean square of each is that of Lambert's factor.
+        """
+        apart: float = np.linalg.norm(LAMBERT * (self.terms - other.terms)).item()
+        return apart
 
     def faded(self) -> Light:
         """Return the same light, less sure of it."""
