@@ -15,6 +15,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from tracker.filter.correction import innovation_covariance
 from tracker.image.harmonics import LAMBERT, TERMS, turned
 from tracker.image.lamps import explained
 from tracker.image.template import GLOSS, Shades, Vector
@@ -57,9 +58,9 @@ class Light:
                 the brightness of its paint.
             R_RtoW: (3, 3) turns the ray's frame into the room.
         """
-        turn, after, aim = turned(R_RtoW), self.information.copy(), self.target.copy()
+        after, aim = self.information.copy(), self.target.copy()
         kept = min(FORGETTING, 1.0 - 1.0 / (self.count + 2.0))  # the first are learned before blur and light are known
-        if not _add(after, aim, turn @ information @ turn.T, turn @ target, self.terms, kept):
+        if not _add(after, aim, information, target, R_RtoW, self.terms, kept):
             return self
         return replace(self, information=after, target=aim, count=self.count + 1)
 
@@ -103,19 +104,24 @@ def _rounded(values: Array, steps: int) -> list[float]:
     return rounded
 
 
-@compiled("b1(f8[:, ::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8)")
-def _add(information: Array, target: Array, more: Array, aim: Array, terms: Array, kept: float) -> bool:
-    """Keep so much and add one ball's normal equations in the room, in place; False if it has no brightness.
+@compiled("b1(f8[:, ::1], f8[::1], f8[:, ::1], f8[::1], Array(f8, 2, 'C', True), f8[::1], f8)")
+def _add(
+    information: Array, target: Array, seen: Array, seen_target: Array, R_RtoW: Array, terms: Array, kept: float
+) -> bool:
+    """Keep so much and add one ball's normal equations, turned into the room, in place; False if it has no brightness.
 
     How bright its paint is in this light is the ball's own, and is taken out: to give every ball the same mean would
     say that no side of the room is brighter, and what is left for the light to follow looks like a centre pulled aside.
     Source: pixels are s T e with paint s and terms e, linearised about today's e and the s that fits it best.
     """
-    shown = more @ terms
-    squares, seen = dot(terms, shown), dot(terms, aim)
-    if not (squares > 0.0 and seen > 0.0):
+    turn = turned(R_RtoW)
+    more, aim, shown = innovation_covariance(turn, seen, np.zeros((TERMS, TERMS))), np.zeros(TERMS), np.zeros(TERMS)
+    for i in range(TERMS):
+        aim[i], shown[i] = dot(turn[i], seen_target), dot(more[i], terms)
+    squares, common = dot(terms, shown), dot(terms, aim)
+    if not (squares > 0.0 and common > 0.0):
         return False
-    paint = seen / squares
+    paint = common / squares
     for i in range(TERMS):
         target[i] = kept * target[i] + paint * (aim[i] - paint * shown[i])
         for j in range(TERMS):
