@@ -16,7 +16,7 @@ from bridge.telemetry.states import Surroundings
 from bridge.wire import Sent
 from tracker.types import Event, Step
 
-WATCH_NS = 200_000_000  # of stream time: alarms are the same for a flight and for its log
+WATCH_NS = 250_000_000  # of stream time: alarms are the same for a flight and for its log
 TOGETHER = 8  # readings that are judged at once where nobody asks meanwhile: in code at hand each takes a quarter
 CHECK_NS = 100_000_000  # of the stopwatch
 CHECKS_PER_SNAPSHOT = 2
