@@ -62,7 +62,7 @@ class Light:
         kept = min(FORGETTING, 1.0 - 1.0 / (self.count + 2.0))  # the first are learned before blur and light are known
         if not _add(after, aim, information, target, R_RtoW, self.terms, kept):
             return self
-        return replace(self, information=after, target=aim, count=self.count + 1)
+        return Light(self.lamp, self.terms, after, aim, self.count + 1)
 
     def solved(self, others: Iterable[Light]) -> Light:
         """Return it with the lamps that explain best what this camera's balls and those of others show."""
@@ -100,8 +100,7 @@ class Light:
 
 
 def _rounded(values: Array, steps: int) -> list[float]:
-    rounded: list[float] = (np.round(values * steps) / steps).tolist()
-    return rounded
+    return [round(value * steps) / steps for value in values.tolist()]
 
 
 @compiled("b1(f8[:, ::1], f8[::1], f8[:, ::1], f8[::1], Array(f8, 2, 'C', True), f8[::1], f8)")
