@@ -89,3 +89,12 @@ def test_what_was_drawn_once_serves_again_without_drawing() -> None:
     album.serve(0, view(3.2), KNOWN)
     album.draws_left = 0
     assert album.serve(0, view(3.0), KNOWN)[0] is first
+
+
+def test_a_blur_that_lessons_move_to_and_fro_keeps_its_template_and_one_that_goes_on_gets_another() -> None:
+    album = Album(CAMERA)
+    first, _ = album.serve(0, view(3.0), KNOWN)
+    for blur_px in (0.46, 0.34, 0.475):
+        assert album.serve(0, view(3.0), Appearance(Response(blur_px, 0.7)))[0] is first
+    another, _ = album.serve(0, view(3.0), Appearance(Response(0.49, 0.7)))
+    assert another.made[2] == pytest.approx(variance_of(0.5, 1))
