@@ -16,7 +16,8 @@ from bridge.telemetry.states import Surroundings
 from bridge.wire import Sent
 from tracker.types import Event, Step
 
-WATCH_NS = 200_000_000  # of stream time: alarms are the same for a flight and for its log
+WATCH_NS = 250_000_000  # of stream time: alarms are the same for a flight and for its log
+TOGETHER = 8  # readings that are judged at once where nobody asks meanwhile: in code at hand each takes a quarter
 CHECK_NS = 100_000_000  # of the stopwatch
 CHECKS_PER_SNAPSHOT = 2
 
@@ -40,7 +41,7 @@ class Telemetry:
         self._stopwatch = stopwatch
         self._gauges = Gauges(names)
         self._standing: Standing = NOTHING
-        self._unjudged: Readings | None = None
+        self._unjudged: list[Readings] = []
         self._watch_due_ns: int | None = None
         self._check_due_ns = 0
         self._checks = 0
@@ -84,20 +85,23 @@ class Telemetry:
             self._post = None
 
     def _watch(self, around: Around) -> None:
-        """Take readings a few times a second of stream time, and judge them at the next one: no pose waits for both."""
-        now_ns = self._gauges.now_ns
-        if self._watch_due_ns is None or now_ns >= self._watch_due_ns:
+        """Take readings a few times a second of stream time, and judge them in a turn without: no pose waits for both.
+
+        What is judged late comes out as if it had been judged at once, by its own time.
+        """
+        now_ns, waiting = self._gauges.now_ns, len(self._unjudged)
+        due = self._watch_due_ns is None or now_ns >= self._watch_due_ns
+        if waiting >= TOGETHER and (waiting >= 2 * TOGETHER or not due):
             self._judge()
+        if due:
             self._watch_due_ns = now_ns + WATCH_NS
-            self._unjudged = readings_of(self._gauges, around(), self._limits)
-        elif self._unjudged is not None and now_ns > self._unjudged.t_ns:
-            self._judge()
+            self._unjudged.append(readings_of(self._gauges, around(), self._limits))
 
     def _judge(self) -> None:
-        """Judge the newest readings, unless that is done."""
-        if self._unjudged is not None:
-            self._standing = advance(self._standing, self._unjudged)
-            self._unjudged = None
+        """Judge the readings that wait for it."""
+        for readings in self._unjudged:
+            self._standing = advance(self._standing, readings)
+        self._unjudged.clear()
 
     def _publish(self, post: Post, around: Around) -> None:
         """Look for listeners ten times a second, and give those there are every second time a snapshot."""

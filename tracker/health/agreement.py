@@ -14,8 +14,12 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from tracker.filter.correction import factor, forward, innovation_covariance, inverse_of
 from tracker.health.sample import MOTION, Sample
+from tracker.maths.compiled import compiled
+from tracker.maths.solve import dot
 from tracker.rig import Rig
 from tracker.types import Array
 
@@ -104,25 +108,9 @@ class Agreement:
         return tuple(camera for camera, found in enumerate(by_others) if evidence.max() - found > NAMED)
 
     def _evidence(self, sample: Sample, hypotheses: list[Hypothesis]) -> list[float]:
-        """Return by how much a knock of some cameras explains a sample better than none [nats].
-
-        Source: the motions c have a mean m and covariance Q, with or without a knock's own variance; the likelihood
-            of a sample is exp(e' B (I + B' N B)^-1 B' e / 2) / sqrt(det(I + B' N B)), e = g - N m, B B' = Q. A hard
-            knock and a slight one are as likely.
-        """
-        P = np.asarray(np.linalg.inv(self._N), dtype=np.float64)
-        e = sample.g - sample.N @ (P @ self._g)
-        Q = P + np.diag(_spread(self._cameras, DRIFT_M, DRIFT_RAD))
-        without = _log_likelihood(e, sample.N, Q)
-        found = []
-        for moved in hypotheses:
-            k = np.concatenate([np.arange(MOTION * camera, MOTION * (camera + 1)) for camera in moved])
-            each = []
-            for knock in KNOCKS:
-                wider = Q.copy()
-                wider[k, k] += _spread(len(moved), *knock)
-                each.append(_log_likelihood(e, sample.N, wider))
-            found.append(float(np.logaddexp.reduce(each)) - math.log(len(each)) - without)
+        """Return by how much a knock of some cameras explains a sample better than none [nats]."""
+        moved = np.array([[camera in one for camera in range(self._cameras)] for one in hypotheses])
+        found: list[float] = _explained(sample.N, sample.g, self._N, self._g, moved).tolist()
         return found
 
 
@@ -136,11 +124,54 @@ def left_open(residual_px: float, rig: Rig) -> Array:
     return np.diag(np.repeat(np.column_stack((places_m, turns_rad)).reshape(-1), 3) ** 2)
 
 
+@compiled("f8(i8, f8, f8)")
+def _variance(index: int, place_m: float, turn_rad: float) -> float:
+    """Return the variance of one of the cameras' motions by its index, for sigmas of their places and turns."""
+    return place_m * place_m if index % MOTION < MOTION // 2 else turn_rad * turn_rad
+
+
+@compiled("f8(f8[::1], f8[:, ::1], f8[:, ::1])")
 def _log_likelihood(e: Array, N: Array, Q: Array) -> float:
-    B = np.linalg.cholesky(Q)
-    S = np.eye(len(N)) + B.T @ N @ B
-    seen = B.T @ e
-    return 0.5 * (float(seen @ np.linalg.solve(S, seen)) - float(np.linalg.slogdet(S)[1]))
+    """Return the logarithm of a sample's likelihood, see `_explained`."""
+    B = factor(Q).T.copy()
+    S = factor(innovation_covariance(B, N, np.eye(len(e))))
+    seen = np.zeros((len(e), 1))
+    for i in range(len(e)):
+        seen[i, 0] = dot(B[i], e)
+    total = 0.0
+    for i, white in enumerate(forward(S, seen)[:, 0]):
+        total += 0.5 * white * white - math.log(S[i, i])
+    return total
+
+
+@compiled("f8[::1](f8[:, ::1], f8[::1], f8[:, ::1], f8[::1], b1[:, ::1])")
+def _explained(N: Array, g: Array, known: Array, known_g: Array, moved: NDArray[np.bool_]) -> Array:
+    """Return by how much a knock of the cameras that moved explains a sample better than none (hypotheses,) [nats].
+
+    Args:
+        N, g: of the sample.  known, known_g: of the calibration's own faults.
+        moved (hypotheses, cameras): which are supposed to.
+    Source: the motions c have a mean m and covariance Q, with or without a knock's own variance; the likelihood
+        of a sample is exp(e' B (I + B' N B)^-1 B' e / 2) / sqrt(det(I + B' N B)), e = g - N m, B B' = Q. A hard
+        knock and a slight one are as likely.
+    """
+    Q, e, found = inverse_of(known), g.copy(), np.full(len(moved), -math.inf)
+    for j in range(len(g)):
+        mean = dot(Q[j], known_g)
+        for i in range(len(g)):
+            e[i] -= N[i, j] * mean
+    for i in range(len(g)):
+        Q[i, i] += _variance(i, DRIFT_M, DRIFT_RAD)
+    without = _log_likelihood(e, N, Q)
+    for h in range(len(moved)):
+        for place_m, turn_rad in KNOCKS:
+            wider = Q.copy()
+            for i in range(len(g)):
+                if moved[h, i // MOTION]:
+                    wider[i, i] += _variance(i, place_m, turn_rad)
+            one = _log_likelihood(e, N, wider) - without - math.log(len(KNOCKS))
+            found[h] = max(found[h], one) + math.log1p(math.exp(-abs(found[h] - one)))
+    return found
 
 
 def _spread(cameras: int, place_m: float, turn_rad: float) -> Array:

@@ -7,12 +7,16 @@ Source: with r the residuals of the sightings (whitened), J their slope by the v
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from tracker.filter.batch import sighted
 from tracker.filter.measure import Indices, camera_table, marker_points, pixels
+from tracker.maths.compiled import compiled
+from tracker.maths.solve import dot, eliminate
 from tracker.rig import Rig
 from tracker.state import OFFSETS, State
 from tracker.types import Array, BallSighting
@@ -49,17 +53,37 @@ def take_sample(sightings: Sequence[BallSighting], state: State, rig: Rig, sigma
     """Hold sightings against a pose; take out what another pose and other clocks would explain.
 
     None as `linearised` gives it.
-    Source: (1) and (2) with the clock offsets beside the pose, J' J being J' J and what the filter knows of them; their
-        rows of one over sigma below the slopes make an orthogonal basis whose upper part does that.
+    Source: (1) and (2) with the clock offsets beside the pose, J' J being J' J and what the filter knows of them.
     """
     one = linearised(sightings, state, rig, sigma_px)
     if one is None:
         return None
     clocks_s = np.sqrt(np.maximum(np.diag(state.P)[OFFSETS:], LEAST_CLOCK_S**2))
-    known = np.hstack((np.zeros((len(clocks_s), one.J.shape[1])), np.diag(1.0 / clocks_s)))
-    basis = np.linalg.qr(np.vstack((np.hstack((one.J, one.C)), known)))[0][: len(one.r)]
-    within = basis.T @ one.D
-    return Sample(one.D.T @ one.D - within.T @ within, one.D.T @ one.r - within.T @ (basis.T @ one.r))
+    rows = np.ascontiguousarray(np.hstack((one.J, one.C, one.D, one.r[:, None])).T)
+    return Sample(*_without_pose(rows, one.J.shape[1], clocks_s))
+
+
+@compiled("Tuple((f8[:, ::1], f8[::1]))(f8[:, ::1], i8, f8[::1])")
+def _without_pose(rows: Array, first: int, clocks_s: Array) -> tuple[Array, Array]:
+    """Return N and g of a sample.
+
+    rows (any, 2n): transposed, the slopes J, whose number is `first`, C and D, and the residuals r.
+    clocks_s (cameras - 1,): one sigma of each clock offset.
+    """
+    m, known = len(rows), first + len(clocks_s)
+    products = np.zeros((m, m))
+    for i in range(m):
+        for j in range(i + 1):
+            products[i, j] = dot(rows[i], rows[j])
+    for i in range(len(clocks_s)):
+        products[first + i, first + i] += clocks_s[i] ** -2
+    eliminate(products, known)
+    size = m - 1 - known
+    N, g = np.empty((size, size)), products[m - 1, known : m - 1].copy()
+    for i in range(size):
+        for j in range(i + 1):
+            N[i, j] = N[j, i] = products[known + i, known + j]
+    return N, g
 
 
 def linearised(sightings: Sequence[BallSighting], state: State, rig: Rig, sigma_px: float) -> Linear | None:
@@ -69,31 +93,42 @@ def linearised(sightings: Sequence[BallSighting], state: State, rig: Rig, sigma_
         sightings: each at its own time, soon before or after the state's.
         sigma_px: what a camera adds to the noise of its fits, one sigma [px].
     """
-    cameras = np.array([sighting.camera for sighting in sightings])
-    if len(sightings) < 4 or len(set(cameras.tolist())) < 2:
+    if len(sightings) < 4 or len({one.camera for one in sightings}) < 2:
         return None
-    balls = np.array([sighting.ball for sighting in sightings])
-    lags_s = np.array([sighting.t_ns - state.t_ns for sighting in sightings]) * 1e-9
-    h, H = pixels(state.mean, state.manoeuvre_s, cameras, balls, lags_s, camera_table(rig), marker_points(rig))
-    if not np.isfinite(h).all():
-        return None
-    variances = np.array([one.cov_px for one in sightings]).trace(axis1=1, axis2=2) / 2.0 + sigma_px**2
-    weight = np.repeat(1.0 / np.sqrt(variances), 2)
-    r = weight * (np.concatenate([sighting.uv_px for sighting in sightings]) - h)
-    D = weight[:, None] * _by_cameras(H[:, :3], cameras, balls, state, rig)
-    return Linear(r, weight[:, None] * H[:, :6], D, weight[:, None] * H[:, OFFSETS:], weight)
+    _, cameras, balls, lags_s, z, covs_px = sighted(tuple(sightings), state.t_ns)
+    table, points_inB = camera_table(rig), marker_points(rig)
+    r, J, D, C, weight = _held_against(
+        state.mean, state.manoeuvre_s, cameras, balls, lags_s, z, covs_px, sigma_px, table, points_inB
+    )
+    return Linear(r, J, D, C, weight) if np.isfinite(r).all() else None
 
 
-def _by_cameras(J_px: Array, cameras: Indices, balls: Indices, state: State, rig: Rig) -> Array:
-    """Return d pixel / d motion of the cameras (2n, 6 cameras) of balls with d pixel / d place J_px (2n, 3).
+@compiled("Tuple((f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[::1]))(f8[::1], f8, i8[::1], i8[::1], f8[::1],"
+          " f8[::1], f8[:, ::1], f8, f8[:, ::1], f8[:, ::1])")  # fmt: skip
+def _held_against(
+    mean: Array, T: float, cameras: Indices, balls: Indices, lags_s: Array, z: Array, covs_px: Array, sigma_px: float,
+    table: Array, points_inB: Array,
+) -> tuple[Array, Array, Array, Array, Array]:  # fmt: skip
+    """Return r, J, D, C and weight of a `Linear`; r is not finite where a ball is behind its camera.
 
     Source: a camera that goes by t and turns by w about its place c sees the point X as if it had gone by
         -t - w x (X - c).
     """
-    D = np.zeros((len(J_px), len(rig.cameras), MOTION))
-    rows, of = np.arange(len(J_px)), np.repeat(cameras, 2)
-    balls_inW = state.p_BinW + marker_points(rig)[balls] @ state.R_BtoW.T
-    arms = balls_inW - np.array([camera.p_CinW for camera in rig.cameras])[cameras]
-    D[rows, of, :3] = -J_px
-    D[rows, of, 3:] = np.cross(J_px, np.repeat(arms, 2, axis=0))
-    return D.reshape(len(J_px), -1)
+    h, H = pixels(mean, T, cameras, balls, lags_s, table, points_inB)
+    r, weight, arm = z - h, np.empty(len(z)), np.empty(3)
+    J, D, C = H[:, :6].copy(), np.zeros((len(z), MOTION * len(table))), H[:, OFFSETS:].copy()
+    for s in range(len(cameras)):
+        for i in range(3):
+            m_inW = dot(mean[3 + 3 * i : 6 + 3 * i], points_inB[balls[s]])
+            arm[i] = mean[i] + m_inW - table[cameras[s], 21 + i]
+        for row in range(2 * s, 2 * s + 2):
+            weight[row] = 1.0 / math.sqrt((covs_px[2 * s, 0] + covs_px[2 * s + 1, 1]) / 2.0 + sigma_px * sigma_px)
+            go = D[row, MOTION * cameras[s] : MOTION * (cameras[s] + 1)]
+            for i in range(3):
+                a, b = (i + 1) % 3, (i + 2) % 3
+                go[i] = -weight[row] * H[row, i]
+                go[3 + i] = weight[row] * (H[row, a] * arm[b] - H[row, b] * arm[a])
+            r[row] *= weight[row]
+            J[row] *= weight[row]
+            C[row] *= weight[row]
+    return r, J, D, C, weight

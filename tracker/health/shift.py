@@ -7,6 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tracker.filter.correction import inverse_of
+from tracker.maths.compiled import compiled
+from tracker.maths.solve import dot
 from tracker.types import Array
 
 LEAST_PATCHES = 4
@@ -16,6 +19,7 @@ FAR_OFF_PX = 4.0  # from the median, before turn and zoom are known
 STEPS = 3
 TURN_SIGMA, ZOOM_SIGMA = 0.01, 0.01  # of what a knock may do, so that few patches in a corner do not tell fables
 SHIFT_SIGMA_PX = 100.0
+TERMS = 4  # of a motion
 PRIOR = np.diag(1.0 / np.array([SHIFT_SIGMA_PX, SHIFT_SIGMA_PX, TURN_SIGMA, ZOOM_SIGMA]) ** 2)
 
 
@@ -55,29 +59,61 @@ def find_shift(xy_px: Array, moved_px: Array, sigma_px: Array) -> Shift | None:
     """
     if len(xy_px) < LEAST_PATCHES:
         return None
-    slopes, weight = _slopes(xy_px), 1.0 / sigma_px**2
-    middle_px = np.median(moved_px, axis=0)
-    rest_px = moved_px - middle_px
-    enough_px = AGREE_PX + BEND * math.hypot(*middle_px.tolist()) + 3.0 * sigma_px
-    for step in range(STEPS):
-        off_px = np.hypot(rest_px[:, 0], rest_px[:, 1])
-        agree = off_px <= (FAR_OFF_PX if step == 0 else enough_px)
-        count = int(agree.sum())
-        if count < LEAST_PATCHES or 2 * count <= len(xy_px):
-            return None
-        w = np.repeat(np.where(agree, weight, 0.0), 2)
-        weighed = slopes * w[:, None]
-        covariance = np.linalg.inv(weighed.T @ slopes + PRIOR)
-        motion = covariance @ (weighed.T @ moved_px.reshape(-1))
-        rest_px = moved_px - (slopes @ motion).reshape(-1, 2)
-    excess = max(1.0, float(w @ rest_px.reshape(-1) ** 2) / (2 * count - len(motion)))
-    return Shift(motion, covariance * excess, count)
+    motion, covariance = np.zeros(TERMS), np.zeros((TERMS, TERMS))
+    count = _agreed(_slopes(xy_px), moved_px.reshape(-1), sigma_px, motion, covariance)
+    return Shift(motion, covariance, count) if count else None
 
 
+@compiled("f8[:, ::1](f8[:, ::1])")
 def _slopes(xy_px: Array) -> Array:
     """Return d moved / d motion (2n, 4), u and v of each point in turn."""
-    slopes = np.zeros((2 * len(xy_px), 4))
-    x, y = xy_px.T
-    slopes[::2, 0], slopes[::2, 2], slopes[::2, 3] = 1.0, -y, x
-    slopes[1::2, 1], slopes[1::2, 2], slopes[1::2, 3] = 1.0, x, y
+    slopes = np.zeros((2 * len(xy_px), TERMS))
+    for i in range(len(xy_px)):
+        x, y = xy_px[i, 0], xy_px[i, 1]
+        slopes[2 * i, 0], slopes[2 * i, 2], slopes[2 * i, 3] = 1.0, -y, x
+        slopes[2 * i + 1, 1], slopes[2 * i + 1, 2], slopes[2 * i + 1, 3] = 1.0, x, y
     return slopes
+
+
+@compiled("f8[:, ::1](f8[:, ::1], f8[::1], f8[::1], f8[::1])")
+def _fitted(slopes: Array, moved_px: Array, weight: Array, motion: Array) -> Array:
+    """Fill in the motion (4,) that fits points best; return its covariance (4, 4). moved_px, weight (2n,): of each."""
+    information, target = PRIOR.copy(), np.zeros(TERMS)
+    for i in range(len(weight)):
+        for j in range(TERMS):
+            weighed = weight[i] * slopes[i, j]
+            target[j] += weighed * moved_px[i]
+            for k in range(TERMS):
+                information[j, k] += weighed * slopes[i, k]
+    covariance = inverse_of(information)
+    for j in range(TERMS):
+        motion[j] = dot(covariance[j], target)
+    return covariance
+
+
+@compiled("i8(f8[:, ::1], f8[::1], f8[::1], f8[::1], f8[:, ::1])")
+def _agreed(slopes: Array, moved_px: Array, sigma_px: Array, motion: Array, covariance: Array) -> int:
+    """Fill in the motion (4,) that most patches share, and its covariance (4, 4); return how many, 0 for no such.
+
+    slopes (2n, 4), moved_px (2n,): u and v of each patch in turn.  sigma_px (n,).
+    """
+    n, count, squares = len(sigma_px), 0, 0.0
+    middle_u, middle_v = np.median(moved_px[::2]), np.median(moved_px[1::2])
+    bend_px, rest_px = BEND * math.hypot(middle_u, middle_v), moved_px.copy()
+    for i in range(n):
+        rest_px[2 * i] -= middle_u
+        rest_px[2 * i + 1] -= middle_v
+    for step in range(STEPS):
+        weight, count = np.zeros(2 * n), 0
+        for i in range(n):
+            enough_px = FAR_OFF_PX if step == 0 else AGREE_PX + bend_px + 3.0 * sigma_px[i]
+            if math.hypot(rest_px[2 * i], rest_px[2 * i + 1]) <= enough_px:
+                weight[2 * i], weight[2 * i + 1], count = sigma_px[i] ** -2, sigma_px[i] ** -2, count + 1
+        if count < LEAST_PATCHES or 2 * count <= n:
+            return 0
+        covariance[:], squares = _fitted(slopes, moved_px, weight, motion), 0.0
+        for i in range(2 * n):
+            rest_px[i] = moved_px[i] - dot(slopes[i], motion)
+            squares += weight[i] * rest_px[i] ** 2
+    covariance *= max(1.0, squares / (2 * count - TERMS))
+    return count

@@ -12,12 +12,13 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from tracker.camera import Camera
-from tracker.image.appearance import BEARING_STEP_RAD, Appearance
+from tracker.image.appearance import BEARING_STEP_RAD, MANY, Appearance
 from tracker.image.light import Light
-from tracker.image.template import RADIUS_STEP_PX, SMALL_PX, Template, draw, sampling_of, steps_of
+from tracker.image.template import BLUR_STEP_PX, RADIUS_STEP_PX, SMALL_PX, Template, draw, sampling_of, steps_of
 from tracker.image.view import RADIUS, RAY_X, RAY_Y
 
 KEPT = 256  # templates, of about 100 kB each: what a flight through a room shows
+WELL_BEYOND = 0.8  # of a step of blur: what a template is off is put right while it is read
 NEAR = 1  # steps of radius and blur together, and of bearing
 
 
@@ -85,9 +86,12 @@ class Album:
 
     def _take_up(self, appearance: Appearance) -> None:
         """Note what of an appearance tells templates apart; it changes with lessons alone."""
-        r = appearance.response
-        _, luma_steps = steps_of(0.0, r.luma_px)
-        _, chroma_steps = steps_of(0.0, r.chroma_px)
+        r, (luma_steps, chroma_steps, *_) = appearance.response, self._looks
+        if appearance.shown.count <= MANY:
+            _, luma_steps = steps_of(0.0, r.luma_px)
+            _, chroma_steps = steps_of(0.0, r.chroma_px)
+        else:
+            luma_steps, chroma_steps = _kept(luma_steps, r.luma_px), _kept(chroma_steps, r.chroma_px)
         looks = luma_steps, chroma_steps, r.block_px, appearance.shown
         if looks != self._looks:
             self._served.clear()
@@ -114,6 +118,13 @@ class Album:
             self._served = {each: served for each, served in self._served.items() if served[2]}  # others may want it
         self._serving[slot] = wanted, template
         return template
+
+
+def _kept(steps: int, blur_px: float) -> int:
+    """Return the steps of a blur, which goes to and fro with each lesson: as they were, unless it is well beyond."""
+    if abs(blur_px - steps * BLUR_STEP_PX) <= WELL_BEYOND * BLUR_STEP_PX:
+        return steps
+    return steps_of(0.0, blur_px)[1]
 
 
 def _near(serving: Wanted, wanted: Wanted) -> bool:

@@ -20,6 +20,7 @@ from tracker.types import Array, Image
 BEARING_STEP_RAD = 0.07  # rays closer than this share a ball's shading
 PUBLISH_AT = (3, 6, 9, 12, 15, 18, 27)  # balls learned when templates follow the light; then, as long as
 PUBLISH_SOON, MANY, PUBLISH_LATE = 9, 144, 36  # they are not many, every so many, and later every so many
+LEAST_CHANGE = 0.02  # of many balls' light: one lamp's, it moves the centre of a 3 px ball by a third of light's doubt
 BLUR_STEP_PX, FIRST_STEP_PX = 0.03, 0.15
 DETAIL_SHARE = 0.05  # of the newest ball in what is known of the camera's colour detail
 MISFIT_MAX = 2.0  # an image that fits no ball teaches nothing
@@ -30,7 +31,8 @@ class Appearance:
     """What is known of one camera so far.
 
     response: the camera's.
-    light: learned.  shown: the light that templates are drawn by; it follows `light` in few, growing steps.
+    light: learned.  shown: the light that templates are drawn by; it follows `light` in few, growing steps, and once
+        many balls were learned only where it has changed.
     """
 
     response: Response = field(default_factory=Response)
@@ -78,13 +80,18 @@ class Appearance:
         if not (light.trusted and _due(light.count)):
             return Appearance(response, light, self.shown)
         light = light.solved(others)
-        return Appearance(response, light, light)
+        return Appearance(response, light, to_show(light, self.shown))
 
 
 def _due(balls: int) -> bool:
     """Say whether templates should follow the light now."""
     every = PUBLISH_SOON if balls <= MANY else PUBLISH_LATE
     return balls in PUBLISH_AT or (balls > PUBLISH_AT[-1] and balls % every == 0)
+
+
+def to_show(light: Light, shown: Light) -> Light:
+    """Return the light to draw templates by: what is shown stays where the light of many balls has hardly changed."""
+    return light if light.count <= MANY or light.apart_from(shown) > LEAST_CHANGE else shown
 
 
 def _ray(ball: Expected, camera: Camera) -> tuple[float, float]:

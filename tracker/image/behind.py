@@ -109,10 +109,12 @@ def _look_at(image: Image, mean: NDArray[np.float32], looks: NDArray[np.uint8], 
             known = 0
     looks[row, column] = min(known + 1, ENOUGH)
     weight = np.float32(1.0 / looks[row, column])
+    pixels, means = image.reshape(image.size), mean.reshape(mean.size)
     for y in range(top, top + TILE_PX):
-        for x in range(left, left + TILE_PX):
-            for channel in range(3):
-                mean[y, x, channel] += weight * (np.float32(image[y, x, channel]) - mean[y, x, channel])
+        first = 3 * (y * image.shape[1] + left)
+        seen, kept = pixels[first : first + 3 * TILE_PX], means[first : first + 3 * TILE_PX]
+        for i in range(3 * TILE_PX):  # of known number, so that the processor takes many at once
+            kept[i] += weight * (np.float32(seen[i]) - kept[i])
 
 
 @compiled("b1(Array(u1, 3, 'C', True), Array(f4, 3, 'C'), Array(u1, 2, 'C'), f8, f8, f8, i8, i8[:, ::1], i8[::1])")

@@ -78,7 +78,17 @@ _SOME = spread(_PLACES)
 _BACK = np.ascontiguousarray(np.linalg.pinv(terms_at(_SOME)))
 
 
+@compiled("f8[:, ::1](Array(f8, 2, 'C', True))")
 def turned(R_RtoW: Array) -> Array:
     """Return T (TERMS, TERMS): the terms at R_RtoW n are T times those at n, for any n and any orthogonal matrix."""
-    turn: Array = terms_at(_SOME @ R_RtoW.T) @ _BACK
+    normals, terms = np.empty((3, _PLACES), np.float32), np.empty((TERMS, _PLACES), np.float32)
+    for i in range(3):
+        for n in range(_PLACES):
+            normals[i, n] = R_RtoW[i, 0] * _SOME[n, 0] + R_RtoW[i, 1] * _SOME[n, 1] + R_RtoW[i, 2] * _SOME[n, 2]
+    _fill(normals, terms)
+    turn = np.zeros((TERMS, TERMS))
+    for k in range(TERMS):
+        for n in range(_PLACES):
+            for m in range(TERMS):
+                turn[k, m] += terms[k, n] * _BACK[n, m]
     return turn

@@ -15,7 +15,8 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tracker.image.harmonics import TERMS, turned
+from tracker.filter.correction import innovation_covariance
+from tracker.image.harmonics import LAMBERT, TERMS, turned
 from tracker.image.lamps import explained
 from tracker.image.template import GLOSS, Shades, Vector
 from tracker.maths.compiled import compiled
@@ -57,11 +58,11 @@ class Light:
                 the brightness of its paint.
             R_RtoW: (3, 3) turns the ray's frame into the room.
         """
-        turn, after, aim = turned(R_RtoW), self.information.copy(), self.target.copy()
+        after, aim = self.information.copy(), self.target.copy()
         kept = min(FORGETTING, 1.0 - 1.0 / (self.count + 2.0))  # the first are learned before blur and light are known
-        if not _add(after, aim, turn @ information @ turn.T, turn @ target, self.terms, kept):
+        if not _add(after, aim, information, target, R_RtoW, self.terms, kept):
             return self
-        return replace(self, information=after, target=aim, count=self.count + 1)
+        return Light(self.lamp, self.terms, after, aim, self.count + 1)
 
     def solved(self, others: Iterable[Light]) -> Light:
         """Return it with the lamps that explain best what this camera's balls and those of others show."""
@@ -74,6 +75,14 @@ class Light:
         except RuntimeError:  # the search for lamps did not end: the light known before serves on
             return self
         return replace(self, lamp=lamp, terms=terms)
+
+    def apart_from(self, other: Light) -> float:
+        """Return by how much two lights differ, rms over all directions a ball's surface may face, their mean being 1.
+
+        Source: the harmonics are orthogonal, and the mean square of each is that of Lambert's factor.
+        """
+        apart: float = np.linalg.norm(LAMBERT * (self.terms - other.terms)).item()
+        return apart
 
     def faded(self) -> Light:
         """Return the same light, less sure of it."""
@@ -91,23 +100,27 @@ class Light:
 
 
 def _rounded(values: Array, steps: int) -> list[float]:
-    rounded: list[float] = (np.round(values * steps) / steps).tolist()
-    return rounded
+    return [round(value * steps) / steps for value in values.tolist()]
 
 
-@compiled("b1(f8[:, ::1], f8[::1], f8[:, ::1], f8[::1], f8[::1], f8)")
-def _add(information: Array, target: Array, more: Array, aim: Array, terms: Array, kept: float) -> bool:
-    """Keep so much and add one ball's normal equations in the room, in place; False if it has no brightness.
+@compiled("b1(f8[:, ::1], f8[::1], f8[:, ::1], f8[::1], Array(f8, 2, 'C', True), f8[::1], f8)")
+def _add(
+    information: Array, target: Array, seen: Array, seen_target: Array, R_RtoW: Array, terms: Array, kept: float
+) -> bool:
+    """Keep so much and add one ball's normal equations, turned into the room, in place; False if it has no brightness.
 
     How bright its paint is in this light is the ball's own, and is taken out: to give every ball the same mean would
     say that no side of the room is brighter, and what is left for the light to follow looks like a centre pulled aside.
     Source: pixels are s T e with paint s and terms e, linearised about today's e and the s that fits it best.
     """
-    shown = more @ terms
-    squares, seen = dot(terms, shown), dot(terms, aim)
-    if not (squares > 0.0 and seen > 0.0):
+    turn = turned(R_RtoW)
+    more, aim, shown = innovation_covariance(turn, seen, np.zeros((TERMS, TERMS))), np.zeros(TERMS), np.zeros(TERMS)
+    for i in range(TERMS):
+        aim[i], shown[i] = dot(turn[i], seen_target), dot(more[i], terms)
+    squares, common = dot(terms, shown), dot(terms, aim)
+    if not (squares > 0.0 and common > 0.0):
         return False
-    paint = seen / squares
+    paint = common / squares
     for i in range(TERMS):
         target[i] = kept * target[i] + paint * (aim[i] - paint * shown[i])
         for j in range(TERMS):

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -88,7 +88,7 @@ class Rivals:
             if ball.response.gamma != self.best.response.gamma:
                 return self  # looked at before this gamma was found
             one = self.best.learned(image, camera, ball, found, _lights(others, self.best))
-            return replace(self, appearances=(one,), count=self.count + 1)
+            return Rivals((one,), self.misfits, self.count + 1, self.pull_px, self.by_room, self.doubt)
         if self.by_room and not behind_is_known(ball):
             return self
         appearances, misfits, centres = [], [], []

@@ -175,3 +175,17 @@ def test_a_link_that_goes_down_is_said_after_its_time_and_taken_back() -> None:
     watched.around = Surroundings((UP,))
     watched.fly(*flight[120:])
     assert watched.names_of_alarms() == {"camera_silent"}
+
+
+def test_alarms_asked_for_late_are_those_of_who_asks_in_every_turn() -> None:
+    """Readings wait to be judged together: they come out by their own time, in their order, and none is left."""
+    down = LinkState("memory:a", False, "no such device", 1, 0, 0)
+    asked, unasked = Watched(), Watched()
+    for number, turn in enumerate(turns(200)):
+        for watched in (asked, unasked):
+            watched.around = Surroundings((down if 60 <= number < 160 else UP,))
+            watched.fly(turn)
+        asked.alarms()
+        if number in (66, 97, 150, 163, 199):
+            assert unasked.alarms() == asked.alarms()
+            assert ("link_down" in asked.names_of_alarms()) is (97 <= number < 199)

@@ -140,3 +140,19 @@ def test_rays_that_meet_have_no_residuals_and_a_bump_shows_in_pixels() -> None:
     after = bumped(rig, Knock(1, turn_deg=(0.0, 0.2, 0.0)))
     off_px, _ = residuals(sightings(true, after, [(0, 0), (1, 0)], SIGMA_PX), rig)
     assert np.abs(off_px) == pytest.approx(np.full(3, rig.cameras[1].focal_px * np.radians(0.2)), rel=0.1)
+
+
+@pytest.mark.parametrize("balls", [2, 3])
+def test_a_sample_holds_what_no_other_pose_explains_even_where_two_balls_leave_a_turn_open(balls: int) -> None:
+    """Beside the projection by pseudo-inverse, the clocks being known."""
+    rig, rng = ring_rig(2), np.random.default_rng(4)
+    for true in flight(5, 2, seed=6):
+        everything = sightings(true, rig, [(c, 0) for c in range(2)], SIGMA_PX, rng)
+        seen = [one for one in everything if one.ball < balls]
+        one, sample = linearised(seen, true, rig, SIGMA_PX), take_sample(seen, true, rig, SIGMA_PX)
+        assert one is not None
+        assert sample is not None
+        within = one.J @ np.linalg.pinv(one.J, rcond=1e-9)
+        left = one.D - within @ one.D
+        np.testing.assert_allclose(sample.N, left.T @ left, atol=1e-6 * np.abs(sample.N).max())
+        np.testing.assert_allclose(sample.g, left.T @ one.r, atol=1e-6 * np.abs(one.D.T @ one.r).max())

@@ -7,7 +7,8 @@ import pytest
 
 from tests.tracker.paper_rig import paper_rig
 from tracker.image.album import Album
-from tracker.image.appearance import Appearance
+from tracker.image.appearance import MANY, Appearance
+from tracker.image.light import Light
 from tracker.image.newton import draw_at, rows_of
 from tracker.image.patch import Response
 from tracker.image.reading import BALL_SIZE, LUMA_VAR, RADIUS
@@ -89,3 +90,24 @@ def test_what_was_drawn_once_serves_again_without_drawing() -> None:
     album.serve(0, view(3.2), KNOWN)
     album.draws_left = 0
     assert album.serve(0, view(3.0), KNOWN)[0] is first
+
+
+def seen_as(blur_px: float, balls: int) -> Appearance:
+    light = Light(count=balls)
+    return Appearance(Response(blur_px, 0.7), light, light)
+
+
+def test_a_blur_that_lessons_move_to_and_fro_keeps_its_template_and_one_that_goes_on_gets_another() -> None:
+    album = Album(CAMERA)
+    first, _ = album.serve(0, view(3.0), seen_as(0.4, MANY + 1))
+    for blur_px in (0.46, 0.34, 0.475):
+        assert album.serve(0, view(3.0), seen_as(blur_px, MANY + 1))[0].made[2] == first.made[2]
+    another, _ = album.serve(0, view(3.0), seen_as(0.49, MANY + 1))
+    assert another.made[2] == pytest.approx(variance_of(0.5, 1))
+
+
+def test_a_blur_learned_from_few_balls_is_followed_by_the_nearest_step() -> None:
+    album = Album(CAMERA)
+    album.serve(0, view(3.0), seen_as(0.4, MANY))
+    followed, _ = album.serve(0, view(3.0), seen_as(0.46, MANY))
+    assert followed.made[2] == pytest.approx(variance_of(0.5, 1))
