@@ -81,9 +81,14 @@ def channel_weights(image: Image, u: float, v: float, radius_px: float) -> Array
     return weights
 
 
+def full_share(image: Image, u: float, v: float, radius_px: float) -> float:
+    """Return the share of the pixels of a ball about (u, v) of which a channel is full, 0..1."""
+    return float(_full_shares(image, u, v, radius_px)[3])
+
+
 def overexposed(image: Image, u: float, v: float, radius_px: float) -> bool:
     """Say whether so much of a ball about (u, v) is too bright for its camera that it teaches nothing of the light.
 
     Light learned from what is left of such balls was wrong, and moved the centres of all balls by a pixel.
     """
-    return bool(_full_shares(image, u, v, radius_px)[3] > TEACHES_SHARE)
+    return full_share(image, u, v, radius_px) > TEACHES_SHARE
