@@ -79,13 +79,6 @@ def brighter(frames: list[Frame]) -> Iterable[Frame]:
         yield replace(frame, image=cv2.convertScaleAbs(frame.image, alpha=1.9).astype(np.uint8))
 
 
-def greener(frames: list[Frame]) -> Iterable[Frame]:
-    """Light the room more strongly, and greener."""
-    for frame in frames:
-        lit = frame.image * np.array((1.3, 1.7, 1.3), np.float32)
-        yield replace(frame, image=np.rint(np.minimum(lit, 255.0)).astype(np.uint8))
-
-
 def flown(recording: Path, spoil: Callable[[list[Frame], Rig, GroundTruth], Iterable[Frame]]) -> list[Estimate]:
     """Track a spoilt recording."""
     settings = load_settings("lab")
@@ -144,12 +137,9 @@ def test_a_camera_not_as_it_was_thought_makes_no_pose_wrong(
     assert farthest(estimates, truth) < POSE_LIMIT
 
 
-@pytest.mark.parametrize("spoil", [brighter, greener])
-def test_balls_too_bright_for_their_cameras_make_no_pose_wrong(
-    spoil: Callable[[list[Frame]], Iterable[Frame]], lab_flight: Path
-) -> None:
+def test_balls_too_bright_for_their_cameras_make_no_pose_wrong(lab_flight: Path) -> None:
     """Light learned from them was wrong, and a ball that its camera half drowns looked a pixel off and sure."""
     truth = read_ground_truth(lab_flight)
-    estimates = flown(lab_flight, lambda frames, _rig, _truth: spoil(frames))
+    estimates = flown(lab_flight, lambda frames, _rig, _truth: brighter(frames))
     assert len(estimates) >= len(truth.t_ns)
     assert farthest(estimates, truth) < POSE_LIMIT
