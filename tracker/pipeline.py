@@ -16,6 +16,7 @@ import numpy as np
 
 from tracker.cadence import Cadence
 from tracker.departure import Departure
+from tracker.exposed import Exposed
 from tracker.filter.continuity import Continuity
 from tracker.filter.ekf import Update
 from tracker.filter.history import History
@@ -73,6 +74,7 @@ class Tracker:
         self._continuity = Continuity(tuning)
         self._cadence = Cadence(len(rig.cameras))
         self._watch = CalibrationWatch(rig, tuning.process.pixel_noise_px, tuning.calibrated_px)
+        self._exposed = Exposed(rig)
         self._moved_px = np.zeros(len(rig.cameras))
         self._anew = False
         self._seen_ns: dict[tuple[int, int], int] = {}  # by camera and ball
@@ -129,7 +131,9 @@ class Tracker:
         used, refused = harvest.sightings[used_before:], harvest.refused[refused_before:]
         health = self._watch.take(frames, used, refused, state, t_ns)
         if health is not None:
-            harvest.health = health
+            if state is not None:
+                self._exposed.look(frames, used, state)
+            harvest.health = self._exposed.told(health)
             self._stand_by(health, harvest)
 
     def _stand_by(self, health: Health, harvest: Harvest) -> None:

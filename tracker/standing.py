@@ -17,11 +17,11 @@ class Witness(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class CameraHealth:
-    """Whether one camera stands where it stood when the flight began, and there where the room file has it.
+    """Whether one camera stands where it stood when the flight began, and there where the room file has it; its light.
 
     moved: beyond doubt it does not.  witness: what the room says.  shift_px: how far the room has moved in its
     picture, at the corner where that is most [px].  at_vehicle_mm: how far such a shift moves a ball that only this
-    camera sees [mm].  Both 0 where not known.
+    camera sees [mm].  Both 0 where not known.  full_share: of its balls' pixels, those too bright for it, 0..1.
     """
 
     name: str
@@ -29,6 +29,7 @@ class CameraHealth:
     witness: Witness
     shift_px: float = 0.0
     at_vehicle_mm: float = 0.0
+    full_share: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)

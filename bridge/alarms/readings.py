@@ -31,7 +31,7 @@ class CameraReading(NamedTuple):
         and one sigma of that [ms]; None while not estimated.
     configured_offset_ms: the config's clock_offset_ms.
     moved: whether it no longer stands where it stood when the flight began, or where the room file has it.
-    shift_px, at_vehicle_mm: see `tracker.standing.CameraHealth`.
+    shift_px, at_vehicle_mm, full_share: see `tracker.standing.CameraHealth`.
     """
 
     name: str
@@ -43,6 +43,7 @@ class CameraReading(NamedTuple):
     moved: bool = False
     shift_px: float = 0.0
     at_vehicle_mm: float = 0.0
+    full_share: float = 0.0
 
 
 class BallReading(NamedTuple):

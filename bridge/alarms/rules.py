@@ -20,6 +20,7 @@ GAP_MS, GAP_SEVERE_MS = 100.0, 300.0
 NIS_HIGH, NIS_LOW = 2.0, 0.4
 SILENT_MS = 500.0
 UNSEEN_S = 3.0
+FULL_SHARE, FULL_SHARE_BACK = 0.4, 0.3  # of balls' pixels: a ball so bright teaches nothing of the light
 BLIND_S = 5.0
 SOUGHT_S = 5.0
 OFFSET_MS, OFFSET_SIGMAS, OFFSET_KNOWN_MS = 3.0, 4.0, 1.5
@@ -153,6 +154,19 @@ def _camera_blind(now: Readings) -> Iterator[Finding]:
             )
 
 
+def _overexposed(now: Readings) -> Iterator[Finding]:
+    for camera in now.cameras:
+        verdict = above(camera.full_share, FULL_SHARE, FULL_SHARE_BACK)
+        if verdict is not Verdict.GOOD:
+            yield Finding(
+                camera.name,
+                verdict,
+                f"{camera.name} is overexposed: {camera.full_share:.0%} of the balls' pixels are too bright for it, "
+                f"limit {FULL_SHARE:.0%}; poses are less exact",
+                "shorten its exposure or lower its gain, or dim the lamps, until no ball is white in its picture",
+            )
+
+
 def _ball_unseen(now: Readings) -> Iterator[Finding]:
     for ball in now.balls:
         verdict = above(ball.unseen_s, UNSEEN_S, 1.0)
@@ -246,6 +260,7 @@ RULES = (
     Rule("nis_low", Level.WARNING, 5.0, 2.0, _nis_low),
     Rule("camera_silent", Level.ALARM, 0.0, 1.0, _camera_silent),
     Rule("camera_blind", Level.WARNING, 0.0, 1.0, _camera_blind),
+    Rule("overexposed", Level.WARNING, 2.0, 2.0, _overexposed),
     Rule("ball_unseen", Level.WARNING, 0.0, 1.0, _ball_unseen),
     Rule("camera_moved", Level.ALARM, 0.0, 5.0, _camera_moved),
     Rule("cameras_at_odds", Level.ALARM, 0.0, 5.0, _cameras_at_odds),

@@ -154,6 +154,7 @@ def health_value(health: Health) -> Value:
                 "witness": camera.witness.value,
                 "shift_px": camera.shift_px,
                 "at_vehicle_mm": camera.at_vehicle_mm,
+                "full_share": camera.full_share,
             }
             for camera in health.cameras
         ],

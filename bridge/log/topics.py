@@ -204,6 +204,7 @@ HEALTH = json_topic(
         witness=text("what the room tells of it: learning, still, moved or blind"),
         shift_px=number("how far the room has moved in its picture, at the corner where that is most [px]"),
         at_vehicle_mm=number("what that shift is at the vehicle's distance [mm]"),
+        full_share=number("share of its balls' pixels that are too bright for it, 0..1"),
     ),
 )
 CLOCK = json_topic(

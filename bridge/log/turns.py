@@ -93,11 +93,18 @@ def _frame(value: dict[str, Any]) -> Frame:
 
 def _health(value: dict[str, Any]) -> Health:
     cameras = tuple(
-        CameraHealth(one["name"], one["moved"], Witness(one["witness"]), one["shift_px"], one["at_vehicle_mm"])
+        CameraHealth(
+            one["name"],
+            one["moved"],
+            Witness(one["witness"]),
+            one["shift_px"],
+            one["at_vehicle_mm"],
+            one.get("full_share", 0.0),
+        )
         for one in value["cameras"]
     )
     figures = value["at_odds"], value["epipolar_px"], value["spacing_mm"]
-    return Health(value["t_ns"], cameras, *figures, value.get("from_start", False))  # logs of before have no such word
+    return Health(value["t_ns"], cameras, *figures, value.get("from_start", False))  # logs of before lack some words
 
 
 def _sightings(value: dict[str, Any], *, used: bool) -> tuple[BallSighting, ...]:

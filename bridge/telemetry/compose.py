@@ -136,6 +136,7 @@ def _camera_reading(gauges: Gauges, index: int) -> CameraReading:
         moved=health is not None and health.moved,
         shift_px=0.0 if health is None else health.shift_px,
         at_vehicle_mm=0.0 if health is None else health.at_vehicle_mm,
+        full_share=0.0 if health is None else health.full_share,
     )
 
 

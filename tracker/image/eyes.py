@@ -10,6 +10,7 @@ import numpy as np
 from tracker.image.album import Album
 from tracker.image.appearance import MISFIT_MAX, Appearance
 from tracker.image.behind import Behind
+from tracker.image.exposure import overexposed
 from tracker.image.look import Look, gaze_of, look_near
 from tracker.image.mounting import Mounting
 from tracker.image.rivals import first_rivals
@@ -160,6 +161,8 @@ class Eyes:
             one, index = look.fitted(sighting), sighting.camera
             camera, image = self._rig.cameras[index], one.frame.image
             expected = one.expected(camera, self._behind[index].room)
+            if overexposed(image, *expected.uv_px, expected.radius_px):
+                continue
             others = [rivals for other, rivals in enumerate(self._rivals) if other != index]
             self._rivals[index] = self._rivals[index].learned(image, camera, expected, one.centre, others)
             if one.streak_px < SMEARED * expected.radius_px:

@@ -88,7 +88,7 @@ def _strange(pixels: Array, believed: Array, u: float, v: float, least_px: float
     counts, total, count = np.zeros(SECTORS), 0.0, 0.0
     for i in range(pixels.shape[1]):
         x, y = pixels[X, i] - u, pixels[Y, i] - v
-        if x * x + y * y < least_px**2:
+        if x * x + y * y < least_px**2 or pixels[TRUST, i] < 0.0:  # what is full shows nothing else
             continue
         square = TUKEY**2 * (1.0 - believed[TRUST, i] / pixels[TRUST, i])
         k = _sector(x, y)

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from tracker.image.doubt import NORMAL, OCTANTS, add_octants, disagreement, doubted_covariance
 from tracker.image.evidence import explained
+from tracker.image.full import FULL_WEIGHT, LEAST_WEIGHT, free_full, weigh_full
 from tracker.image.patch import LUMA, PLANE, TRUST, X, Y, channels_of, without_room
 from tracker.image.reading import CHROMA_VAR, LUMA_VAR, read
 from tracker.maths.compiled import compiled
@@ -14,7 +15,6 @@ from tracker.maths.solve import TINY, cholesky, dot, lower, solve
 from tracker.types import Array
 
 TUKEY = 4.685  # of the robust sigma: 95 % efficient where all is well (Huber, Ronchetti, "Robust Statistics", 2009)
-LEAST_WEIGHT = 1e-3
 LEAST_MISFIT = 0.4  # a fit is surer where less noise is seen than was allowed for, as far as this
 ITERATIONS = 5
 LATTICE = 8  # places per pixel where a ball is linearised
@@ -122,6 +122,8 @@ def _add_channel(
     room = pixels[LUMA + channels_of(pixels) + channel]
     slope_of(pixels, room, drawn[m : m + p], c, slope_u)
     slope_of(pixels, room, drawn[m + p : m + 2 * p], c, slope_v)
+    if channels_of(pixels) == 1:
+        free_full(pixels, rows)
     uu = uv = vv = ur = vr = 0.0
     for i in range(len(weight)):
         u, v = weight[i] * slope_u[i], weight[i] * slope_v[i]
@@ -186,21 +188,26 @@ def _linearise(
         _add_channel(pixels, seen[channel], drawn, weight, work[:m], channel, factor, c, rows, T, squares, normal)
 
 
-@compiled("UniTuple(f8, 2)(f8[::1], f8[::1], i8, i8, f8[::1])")
-def _misfit(squares: Array, tukey: Array, channels: int, shapes: int, normal: Array) -> tuple[float, float]:
+@compiled("UniTuple(f8, 2)(f8[:, ::1], f8[::1], f8[::1], i8, i8, f8[::1])")
+def _misfit(
+    pixels: Array, squares: Array, tukey: Array, channels: int, shapes: int, normal: Array
+) -> tuple[float, float]:  # fmt: skip
     """Return chi2 per degree of freedom of brightness or colour, and the noise that normal (5,) is weakened for.
 
-    That is no less than 1, unless all pixels leave less, those too that the fit did not believe.
+    That is no less than 1, unless all pixels leave less, those too that the fit did not believe. Full pixels show no
+    noise; where hardly any others are, nothing tells it, and 1 is taken.
     """
     least = -float(channels * (shapes + PLANE))
-    freedom, total, pixels, everything = least, 0.0, least, 0.0
+    freedom, total, count, everything = least, 0.0, least, 0.0
     for i in range(len(squares)):
+        if pixels[TRUST, i] < 0.0:
+            continue
         freedom += channels * tukey[i] ** 2
         total += squares[i] * tukey[i] ** 2
-        pixels += channels
+        count += channels
         everything += squares[i]
-    misfit = total / max(1.0, freedom)
-    noise = max(misfit, min(1.0, max(LEAST_MISFIT, everything / max(1.0, pixels))))
+    misfit = total / freedom if freedom >= 1.0 else 1.0
+    noise = max(misfit, min(1.0, max(LEAST_MISFIT, everything / max(1.0, count))))
     normal /= noise
     return misfit, noise
 
@@ -245,6 +252,9 @@ def gauss_newton(
     drawn_b, work_b, seen_b, tukey_b, squares_b = _laid_out(np.empty((_rows_of_sheet(p, 1), n_bright)), p, 1)
     drawn_c, work_c, seen_c, tukey_c, squares_c = _laid_out(np.empty((_rows_of_sheet(p, 2), n_colour)), p, 2)
     tukey_b[:], tukey_c[:] = 1.0, 1.0
+    for i in range(n_bright):
+        if bright[TRUST, i] < 0.0:
+            tukey_b[i] = FULL_WEIGHT
     small, normals = np.empty((p + PLANE + 4, p + PLANE)), np.zeros((OCTANTS + 3, NORMAL))
     octants, normal = normals[:OCTANTS], normals[OCTANTS + 2]
     normal_b, normal_c = normals[OCTANTS], normals[OCTANTS + 1]
@@ -259,8 +269,8 @@ def gauss_newton(
             drawn_u, drawn_v = at_u, at_v
         _linearise(bright, drawn_b, tukey_b, work_b, seen_b, small[:-1], squares_b, normal_b)
         _linearise(colour, drawn_c, tukey_c, work_c, seen_c, small, squares_c, normal_c)
-        misfit_b, noise_b = _misfit(squares_b, tukey_b, 1, p, normal_b)
-        misfit_c, noise_c = _misfit(squares_c, tukey_c, 2, p, normal_c)
+        misfit_b, noise_b = _misfit(bright, squares_b, tukey_b, 1, p, normal_b)
+        misfit_c, noise_c = _misfit(colour, squares_c, tukey_c, 2, p, normal_c)
         for k in range(NORMAL):
             normal[k] = normal_b[k] + normal_c[k]
         det = normal[0] * normal[2] - normal[1] * normal[1]
@@ -273,6 +283,7 @@ def gauss_newton(
         if moved <= ROUGH_PX:  # weights before that would hold the wrong place fast
             _doubt(squares_b, 1, tukey_b)
             _doubt(squares_c, 2, tukey_c)
+        weigh_full(bright, work_b[p + PLANE + 1], tukey_b)
     fit[0], fit[1] = u, v
     add_octants(bright, work_b[p + PLANE + 1 :], at_u, at_v, 1.0 / noise_b, octants)
     add_octants(colour, work_c[p + PLANE + 1 :], at_u, at_v, 1.0 / noise_c, octants)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.image.behind import KNOWN, NO_ROOM, WELL_KNOWN, Room, is_known
+from tracker.image.exposure import CLIPPED, brightness_of, channel_weights, is_full
 from tracker.image.template import MARGIN_PX, STREAK_MAX_PX, Shades, Streak, Template
 from tracker.image.whiten import (
     BLUE_SCALE,
@@ -26,7 +27,7 @@ from tracker.maths.compiled import compiled
 from tracker.types import Array, Image
 
 RING_PX = 1.5  # the background's own variation is measured from this far beyond the ball's edge to the patch's corner
-CLIPPED, CLIPPED_TRUST = 254, 0.1  # grey level at which a channel is full; what it shows is too dark
+FULL_TRUST = 0.1  # of a full pixel's colour
 DARKEST = 0.04  # below this share of white a camera's response is straight
 WHITE = 255.0
 SUBSAMPLED_PX = 2  # most cameras and JPEG keep colour by blocks of 2 x 2 pixels, which begin at even ones
@@ -41,8 +42,8 @@ NOT_HELD: Array = np.empty((0, 3))
 class Patch:
     """The pixels round a ball.
 
-    bright (5, n): for each pixel X, Y from the middle pixel [px], TRUST, how far it counts, LUMA, and LUMA of the room
-    behind, 0 where that is not known.
+    bright (5, n): for each pixel X, Y from the middle pixel [px], TRUST, how far it counts, negative where it is full,
+    LUMA, of the channels that the ball does not fill, and LUMA of the room behind, 0 where that is not known.
     colour (7, n or n / 4): for each pixel or block of 2 x 2 X, Y of its middle, TRUST, BLUE and RED difference, and
     both of the room behind.
     LUMA, BLUE and RED are in units of their noise.
@@ -178,7 +179,8 @@ def cut_pixels(
     blocks = _blocks_within(u, v, half, block, du, dv, reach_px)
     bright, colour, scale = np.empty((5, blocks * block**2)), np.empty((7, blocks)), np.empty(SCALES)
     share, known = 1.0 / (block * block), is_known(looks, u, v, half, KNOWN)
-    whitening(image, room, known, u, v, half, block, du, dv, edge_px + RING_PX, scale)
+    weights = channel_weights(image, u + du, v + dv, edge_px)
+    whitening(image, room, known, u, v, half, block, du, dv, edge_px + RING_PX, weights, scale)
     shows = scale[ROOM_SHARE]
     for top in range(v - half + ((v - half) % block), v + half - block + 2, block):
         for left in range(u - half + ((u - half) % block), u + half - block + 2, block):
@@ -191,28 +193,29 @@ def cut_pixels(
                 down = k >> (block - 1)  # of a block of two; of one both are 0
                 row, column = top + down, left + k - block * down
                 b, g, r = image[row, column, 0], image[row, column, 1], image[row, column, 2]
-                luma, by_blue, by_red = luma_blue_red(light[b], light[g], light[r])
-                brightness = 0.114 * b + 0.587 * g + 0.299 * r
-                full = max(b, g, r) >= CLIPPED
-                clipped = clipped or full
-                mean += share * brightness
+                _, by_blue, by_red = luma_blue_red(light[b], light[g], light[r])
+                mean += share * (0.114 * b + 0.587 * g + 0.299 * r)
+                brightness, full = brightness_of(weights, b, g, r), is_full(weights, b, g, r)
+                luma = brightness_of(weights, light[b], light[g], light[r])
+                clipped = clipped or max(b, g, r) >= CLIPPED
                 blue += share * by_blue
                 red += share * by_red
                 i = block * block * count + k
                 bright[X, i] = column - u
                 bright[Y, i] = row - v
-                bright[TRUST, i] = trust[int(brightness + 0.5)] * (CLIPPED_TRUST if full else 1.0)
+                bright[TRUST, i] = trust[int(brightness + 0.5)] * (-1.0 if full else 1.0)
                 bright[LUMA, i] = luma * scale[LUMA_SCALE]
                 bright[LUMA + 1, i] = 0.0
                 if shows > 0.0:
                     b, g, r = room[row, column, 0] + 0.5, room[row, column, 1] + 0.5, room[row, column, 2] + 0.5
-                    luma, by_blue, by_red = luma_blue_red(light[int(b)], light[int(g)], light[int(r)])
+                    _, by_blue, by_red = luma_blue_red(light[int(b)], light[int(g)], light[int(r)])
+                    luma = brightness_of(weights, light[int(b)], light[int(g)], light[int(r)])
                     blue_behind += share * by_blue
                     red_behind += share * by_red
                     bright[LUMA + 1, i] = shows * luma * scale[LUMA_SCALE]
             colour[X, count] = x
             colour[Y, count] = y
-            colour[TRUST, count] = trust[int(mean + 0.5)] * (CLIPPED_TRUST if clipped else 1.0)
+            colour[TRUST, count] = trust[int(mean + 0.5)] * (-FULL_TRUST if clipped else 1.0)
             colour[BLUE, count] = blue * scale[BLUE_SCALE]
             colour[RED, count] = red * scale[RED_SCALE] - blue * scale[RED_BY_BLUE]
             colour[BLUE + 2, count] = shows * blue_behind * scale[BLUE_SCALE]

@@ -28,6 +28,7 @@ APART = 0.6  # as far on either side of a gamma found lie those that it is tried
 SEARCHING = 0.3  # one sigma of a gamma while rivals differ little
 LEAST_DOUBT, MOST_DOUBT = 0.08, 1.0  # of a gamma found
 LEAST_AT_THE_END = 0.04  # of 1, where the range ends
+UNLIT_PX = 0.12  # what all centres may be wrong by together while the light is not known
 LEAST_PULL_PX = 0.06  # a unit of gamma: the pull is learned from few balls
 BEND_DOUBT, SLOPE_DOUBT = 0.2, 0.02  # one sigma of a gamma found, times the parabola's bend, or its slope at 1
 ROUND_BALLS, LONG_ROUND_BALLS = 54, 90  # balls that a set of rivals learns from before it is judged: the long round
@@ -54,8 +55,9 @@ class Rivals:
 
     @property
     def doubt_px(self) -> float:
-        """Return by how much, one sigma, all centres may be wrong together since gamma is not known exactly [px]."""
-        return self.doubt * math.hypot(*self.pull_px, LEAST_PULL_PX)
+        """Return by how much, one sigma, all centres may be wrong together since light or gamma are not known [px]."""
+        by_gamma_px = self.doubt * math.hypot(*self.pull_px, LEAST_PULL_PX)
+        return by_gamma_px if self.best.light.trusted else math.hypot(by_gamma_px, UNLIT_PX)
 
     @property
     def best(self) -> Appearance:

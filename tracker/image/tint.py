@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
-from tracker.image.patch import CLIPPED
+from tracker.image.exposure import CLIPPED
 from tracker.maths.compiled import compiled
 from tracker.types import Image
 

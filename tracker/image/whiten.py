@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.image.exposure import block_is_full, brightness_of, is_full
 from tracker.maths.compiled import compiled
 from tracker.maths.solve import eliminate
 from tracker.types import Array, Image
@@ -63,10 +64,12 @@ def _add_products(products: Array, x: float, y: float, a: float, b: float) -> No
     products[4, 4] += b * b
 
 
-@compiled("UniTuple(f8, 2)(Array(uint8, 3, 'C', True), Array(f4, 3, 'C'), b1, i8, i8, i8, i8, f8, f8, f8, f8[:, ::1])")
+@compiled(
+    "UniTuple(f8, 2)(Array(uint8, 3, 'C', True), Array(f4, 3, 'C'), b1, i8, i8, i8, i8, f8, f8, f8, f8[::1],f8[:, ::1])"
+)
 def _brightness(
     image: Image, room: NDArray[np.float32], known: bool, u: int, v: int, half: int, block: int, du: float, dv: float,
-    beyond_px: float, products: Array,
+    beyond_px: float, weights: Array, products: Array,
 ) -> tuple[float, float]:  # fmt: skip
     """Return the variance of luma about a plane and the room, and how strongly that shows: 0 if it is no help.
 
@@ -82,10 +85,14 @@ def _brightness(
                 continue
             for row in range(top, top + block):
                 for column in range(left, left + block):
-                    luma, _, _ = colour_at(image, column, row)
+                    b, g, r = image[row, column, 0], image[row, column, 1], image[row, column, 2]
+                    if is_full(weights, b, g, r):
+                        continue
+                    luma = brightness_of(weights, b, g, r)
                     behind = 0.0
                     if known:
-                        behind, _, _ = luma_blue_red(room[row, column, 0], room[row, column, 1], room[row, column, 2])
+                        b, g, r = room[row, column, 0], room[row, column, 1], room[row, column, 2]
+                        behind = brightness_of(weights, b, g, r)
                     _add_products(products, float(column - u), float(row - v), behind, luma)
     eliminate(products, 3)
     freedom, plain = max(products[0, 0] - 3.0, 1.0), max(products[4, 4], 0.0)
@@ -98,23 +105,25 @@ def _brightness(
     return plain / freedom, 0.0
 
 
-@compiled("void(Array(uint8, 3, 'C', True), Array(f4, 3, 'C'), b1, i8, i8, i8, i8, f8, f8, f8, f8[::1])")
+@compiled("void(Array(uint8, 3, 'C', True), Array(f4, 3, 'C'), b1, i8, i8, i8, i8, f8, f8, f8, f8[::1], f8[::1])")
 def whitening(
     image: Image, room: NDArray[np.float32], known: bool, u: int, v: int, half: int, block: int, du: float, dv: float,
-    beyond_px: float, scale: Array,
+    beyond_px: float, weights: Array, scale: Array,
 ) -> None:  # fmt: skip
     """Find the scales (SCALES,) of luma and of the two colour differences by what varies round a ball.
 
-    That is the variation about a plane and, where it is known, the room. Luma varies by pixel, colour by block; colour
-    is made white by Cholesky's factor.
+    That is the variation about a plane and, where it is known, the room, of what is not full. Luma, of the channels'
+    weights (3,), varies by pixel, colour by block; colour is made white by Cholesky's factor.
     """
     products = np.empty((5, 5))
-    variance, share = _brightness(image, room, known, u, v, half, block, du, dv, beyond_px, products)
+    variance, share = _brightness(image, room, known, u, v, half, block, du, dv, beyond_px, weights, products)
     products[:] = 0.0
     for top in range(v - half + ((v - half) % block), v + half - block + 2, block):
         for left in range(u - half + ((u - half) % block), u + half - block + 2, block):
             x, y = left + (block - 1) / 2 - u, top + (block - 1) / 2 - v
             if (x - du) ** 2 + (y - dv) ** 2 <= beyond_px**2:
+                continue
+            if block_is_full(image, left, top, block):
                 continue
             _, blue, red = _colour_of_block(image, room, share, left, top, block)
             _add_products(products, x, y, blue, red)

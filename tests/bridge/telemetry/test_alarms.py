@@ -57,6 +57,7 @@ FAULTS: dict[str, Readings] = {
     "nis_low": replace(WELL, nis_ratio=0.2),
     "camera_silent": replace(WELL, cameras=(CameraReading("left", 900.0),)),
     "camera_blind": replace(WELL, cameras=(CameraReading("left", 20.0, 8.0),)),
+    "overexposed": replace(WELL, cameras=(CameraReading("left", 20.0, full_share=0.6),)),
     "camera_moved": replace(WELL, cameras=(CameraReading("left", 20.0, moved=True, shift_px=4.2, at_vehicle_mm=11.0),)),
     "cameras_at_odds": replace(WELL, at_odds=True, epipolar_px=2.1),
     "ball_unseen": replace(WELL, balls=(BallReading("green", 5.0),)),
@@ -114,6 +115,7 @@ def test_a_fault_shorter_than_its_rule_asks_raises_nothing(rule: Rule) -> None:
         (replace(WELL, rate_hz=14.65), "rate"),
         (replace(WELL, latency_p99_ms=57.0), "latency"),
         (replace(WELL, nis_ratio=1.9), "nis_high"),
+        (replace(WELL, cameras=(CameraReading("left", 20.0, full_share=0.35),)), "overexposed"),
     ],
 )
 def test_a_figure_that_dances_on_its_limit_neither_raises_nor_ends_an_alarm(between: Readings, name: str) -> None:

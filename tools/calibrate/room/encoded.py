@@ -17,7 +17,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.image.newton import LEAST_MISFIT, LEAST_WEIGHT, TUKEY, draw_at, rows_of, slope_of
+from tracker.image.full import LEAST_WEIGHT
+from tracker.image.newton import LEAST_MISFIT, TUKEY, draw_at, rows_of, slope_of
 from tracker.image.patch import DARKEST, PLANE, WHITE
 from tracker.image.reading import LUMA_VAR
 from tracker.image.robust import MEDIANS

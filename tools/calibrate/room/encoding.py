@@ -11,8 +11,9 @@ from tools.calibrate.room.encoded import OWN, SHAPES, U, V, fit_encoded
 from tracker.image.appearance import MISFIT_MAX, Appearance
 from tracker.image.behind import NO_ROOM
 from tracker.image.centre import Centre, numbers_of
+from tracker.image.exposure import CLIPPED, LUMA_WEIGHTS
 from tracker.image.holder import without_holders
-from tracker.image.patch import CLIPPED, CLIPPED_TRUST, RING_PX, TRUST, Expected, Patch, extent_of, light_of
+from tracker.image.patch import FULL_TRUST, RING_PX, TRUST, Expected, Patch, extent_of, light_of
 from tracker.image.template import MARGIN_PX, template_for
 from tracker.image.whiten import SCALES, whitening
 from tracker.types import Array, Image, frozen_array
@@ -65,7 +66,7 @@ def square_of(image: Image, ball: Expected) -> Square | None:
     x, y = left + columns.ravel() - extent.u, top + rows.ravel() - extent.v
     near = np.hypot(x - extent.du, y - extent.dv) < extent.edge_px + MARGIN_PX
     full = image[top : top + 2 * side, left : left + 2 * side].max(axis=2).ravel() >= CLIPPED
-    pixels = np.array((x, y, near * np.where(full, CLIPPED_TRUST, 1.0)), dtype=np.float64)
+    pixels = np.array((x, y, near * np.where(full, FULL_TRUST, 1.0)), dtype=np.float64)
     in_blocks = pixels.reshape(3, side, 2, side, 2)
     blocks = np.concatenate((in_blocks[:2].mean(axis=(2, 4)), in_blocks[2:].min(axis=(2, 4)))).reshape(3, -1)
     seen = without_holders(Patch(pixels, blocks), extent, ball)
@@ -91,7 +92,7 @@ def fitted(image: Image, ball: Expected, known: Encoding, which: int, shared: Ar
         return None
     extent, scale, covariance = extent_of(ball), np.zeros(SCALES), np.empty((2, 2))
     u, v, du, dv = extent.u, extent.v, extent.du, extent.dv
-    whitening(image, NO_ROOM.mean, False, u, v, extent.half, 2, du, dv, extent.edge_px + RING_PX, scale)
+    whitening(image, NO_ROOM.mean, False, u, v, extent.half, 2, du, dv, extent.edge_px + RING_PX, LUMA_WEIGHTS, scale)
     own = np.zeros(OWN)
     own[U], own[V] = du, dv
     response = ball.response
