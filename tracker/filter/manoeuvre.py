@@ -15,7 +15,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from tracker.filter.correction import inverse_of
+from tracker.filter.correction import factor, forward
 from tracker.filter.matern import KINDS, MOTIONS, unit_noise
 from tracker.maths.compiled import compiled
 from tracker.state import Process
@@ -140,18 +140,18 @@ def expected(levels: Array, of: Array) -> Array:
 
 
 @compiled("f8(f8[:, ::1], f8[:, ::1], i8)")
-def _least_seen(inverse: Array, H: Array, motion: int) -> float:
+def _least_seen(S: Array, H: Array, motion: int) -> float:
     """Return the information of pixels on the place or the turn along the axis that they show least [1/m^2, 1/rad^2].
 
-    inverse (n, n): of the innovations' covariance.  H (n, size): their slope.
+    S (n, n), H (n, size): the innovations' covariance and slope.
     Source: the harmonic mean of the eigenvalues of H' S^-1 H (3, 3), which is near the least where one is small.
     """
-    M, first = np.zeros((AXES, AXES)), AXES * motion
-    for i in range(len(H)):
-        for j in range(len(H)):
-            for a in range(AXES):
-                for b in range(AXES):
-                    M[a, b] += H[i, first + a] * inverse[i, j] * H[j, first + b]
+    first, M = AXES * motion, np.zeros((AXES, AXES))
+    white = forward(factor(S), H[:, first : first + AXES].copy())
+    for i in range(len(white)):
+        for a in range(AXES):
+            for b in range(AXES):
+                M[a, b] += white[i, a] * white[i, b]
     pairs = cubes = 0.0  # the sum of the products of two eigenvalues, and the product of all
     for a in range(AXES):
         b, c = (a + 1) % AXES, (a + 2) % AXES
@@ -182,7 +182,7 @@ def as_gained(levels: Array, of: Array, H: Array, A: Array, B: Array, dt: float,
         for k in range(len(B)):
             if k % MOTIONS != motion:
                 S += means[k] * B[k]
-        seen, raised, gained = _least_seen(inverse_of(S), H, motion), 0.0, 0.0
+        seen, raised, gained = _least_seen(S, H, motion), 0.0, 0.0
         for level in range(levels.shape[1]):
             bs = 0.0
             for kind in range(KINDS):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.image.exposure import block_is_full, brightness_of, is_full
+from tracker.image.exposure import Weights, block_is_full, brightness_of, is_full
 from tracker.maths.compiled import compiled
 from tracker.maths.solve import eliminate
 from tracker.types import Array, Image
@@ -65,11 +65,12 @@ def _add_products(products: Array, x: float, y: float, a: float, b: float) -> No
 
 
 @compiled(
-    "UniTuple(f8, 2)(Array(uint8, 3, 'C', True), Array(f4, 3, 'C'), b1, i8, i8, i8, i8, f8, f8, f8, f8[::1],f8[:, ::1])"
+    "UniTuple(f8, 2)(Array(uint8, 3, 'C', True), Array(f4, 3, 'C'), b1, i8, i8, i8, i8, f8, f8, f8,"
+    "UniTuple(f8, 3), f8[:, ::1])"
 )
 def _brightness(
     image: Image, room: NDArray[np.float32], known: bool, u: int, v: int, half: int, block: int, du: float, dv: float,
-    beyond_px: float, weights: Array, products: Array,
+    beyond_px: float, weights: Weights, products: Array,
 ) -> tuple[float, float]:  # fmt: skip
     """Return the variance of luma about a plane and the room, and how strongly that shows: 0 if it is no help.
 
@@ -105,15 +106,17 @@ def _brightness(
     return plain / freedom, 0.0
 
 
-@compiled("void(Array(uint8, 3, 'C', True), Array(f4, 3, 'C'), b1, i8, i8, i8, i8, f8, f8, f8, f8[::1], f8[::1])")
+@compiled(
+    "void(Array(uint8, 3, 'C', True), Array(f4, 3, 'C'), b1, i8, i8, i8, i8, f8, f8, f8, UniTuple(f8, 3), f8[::1])"
+)
 def whitening(
     image: Image, room: NDArray[np.float32], known: bool, u: int, v: int, half: int, block: int, du: float, dv: float,
-    beyond_px: float, weights: Array, scale: Array,
+    beyond_px: float, weights: Weights, scale: Array,
 ) -> None:  # fmt: skip
     """Find the scales (SCALES,) of luma and of the two colour differences by what varies round a ball.
 
     That is the variation about a plane and, where it is known, the room, of what is not full. Luma, of the channels'
-    weights (3,), varies by pixel, colour by block; colour is made white by Cholesky's factor.
+    weights, varies by pixel, colour by block; colour is made white by Cholesky's factor.
     """
     products = np.empty((5, 5))
     variance, share = _brightness(image, room, known, u, v, half, block, du, dv, beyond_px, weights, products)

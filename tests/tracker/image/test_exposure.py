@@ -40,7 +40,7 @@ def test_a_channel_that_a_ball_fills_does_not_count_in_its_brightness() -> None:
 @pytest.mark.parametrize("level", [CLIPPED - 1, FULL])
 def test_all_channels_count_where_a_ball_fills_none_or_all(level: int) -> None:
     weights = channel_weights(disc((level, level, level)), AT_PX, AT_PX, RADIUS_PX)
-    assert weights.tolist() == LUMA_WEIGHTS.tolist()
+    assert weights == LUMA_WEIGHTS
 
 
 def test_a_ball_teaches_unless_much_of_it_is_full_in_any_channel() -> None:
