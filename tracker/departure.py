@@ -18,12 +18,12 @@ from tracker.types import Array, Estimate, TrackState, read_only
 HELD = "held"  # the stage in which a pose waits for later rounds
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class _Waiting:
     """A pose that was found and has not left yet.
 
     available_ns, since_ns: stopwatch readings when its newest frame stood in memory, and when it was found [ns].
-    resets: the reset counter.  stages: what each stage took [ns].
+    resets: the reset counter.  stages: what each stage took [ns].  rounds: later ones that were worked off meanwhile.
     """
 
     t_ns: int
@@ -32,6 +32,7 @@ class _Waiting:
     track: TrackState
     resets: int
     stages: dict[str, int]
+    rounds: int = 0
 
 
 class Departure:
@@ -61,15 +62,20 @@ class Departure:
         since_ns = self._stopwatch() if self._lag_rounds else 0
         self._waiting.append(_Waiting(t_ns, available_ns, since_ns, track, resets, stages))
 
+    def passed(self, t_ns: int) -> None:
+        """Take note that a round of that instant was worked off, whatever it showed."""
+        for one in self._waiting:
+            one.rounds += t_ns > one.t_ns
+
     def due(self, history: History, rig: Rig, eyes: Eyes, moved_px: Array, *, all_of_them: bool) -> list[Estimate]:
-        """Let those go whose time it is, or all.
+        """Let those go whose time it is, or all; not one whose update was taken back and fitted no more.
 
         Args:
             history: of the track that found them.
             rig, eyes, moved_px: what the cameras are known by now, see `reported`.
         """
         leaving = []
-        while len(self._waiting) > (0 if all_of_them else self._lag_rounds):
+        while self._waiting and (all_of_them or self._waiting[0].rounds >= self._lag_rounds):
             one = self._waiting.popleft()
             if updates := history.since(one.t_ns):
                 leaving.append(self._estimate(one, updates, rig, eyes, moved_px))

@@ -125,6 +125,8 @@ class Tracker:
         used_before, refused_before = len(harvest.sightings), len(harvest.refused)
         t_ns = max([frame.t_ns for frame in frames])
         self._locate(frames, t_ns, harvest)
+        self._departure.passed(t_ns)
+        self._let_go(harvest)
         state = self._history.newest if self._track is TrackState.TRACKING else None
         used, refused = harvest.sightings[used_before:], harvest.refused[refused_before:]
         health = self._watch.take(frames, used, refused, state, t_ns)
@@ -168,7 +170,6 @@ class Tracker:
         stages = harvest.stages(started_ns - available_ns, self._stopwatch() - started_ns)
         self._continuity.went_out(found.state)
         self._departure.take(found.state.t_ns, available_ns, self._track, self._continuity.resets, stages)
-        self._let_go(harvest)
 
     def _let_go(self, harvest: Harvest, *, all_of_them: bool = False) -> None:
         """Let the poses out whose time it is, or all that wait."""
