@@ -184,9 +184,11 @@ class Tracker:
             self._history.remember(result)
         for past in later:
             again = self._study.update(self._ahead(past.t_ns), past.sightings)
-            if isinstance(again, Update):
-                self._history.remember(again)
-                result = again
+            if isinstance(again, Rejected):
+                harvest.rejections.append(again)
+                continue
+            self._history.remember(again)
+            result = again
         return result
 
     def _ahead(self, t_ns: int, clock_breaks: Mapping[int, float] = NO_BREAKS) -> Prediction:
