@@ -169,12 +169,12 @@ class Tracker:
         available_ns = max([frame.available_ns for frame in frames])
         stages = harvest.stages(started_ns - available_ns, self._stopwatch() - started_ns)
         self._continuity.went_out(found.state)
-        self._departure.take(found.state.t_ns, available_ns, self._track, self._continuity.resets, stages)
+        resets = self._continuity.resets
+        self._departure.take(found.state.t_ns, available_ns, self._track, resets, stages, self._eyes)
 
     def _let_go(self, harvest: Harvest, *, all_of_them: bool = False) -> None:
         """Let the poses out whose time it is, or all that wait."""
-        departing = self._departure.due(self._history, self._rig, self._eyes, self._moved_px, all_of_them=all_of_them)
-        harvest.estimates += departing
+        harvest.estimates += self._departure.due(self._history, self._rig, self._moved_px, all_of_them=all_of_them)
 
     def _follow(self, frames: Round, t_ns: int, harvest: Harvest) -> Update | None:
         """Update the track with a round; a late one is put in where it belongs and what came after is done again."""
