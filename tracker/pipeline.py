@@ -98,7 +98,7 @@ class Tracker:
         return self._step(harvest)
 
     def finish(self) -> Step:
-        """Work off the round that was still open when the frames ended."""
+        """Work off the round that was still open when the frames ended, and let go what waits."""
         harvest = self._work_off(self._rounds.rest())
         self._let_go(harvest, all_of_them=True)
         return self._step(harvest)
