@@ -103,7 +103,7 @@ class Outlet:
             for link, names in said:
                 for name in names:
                     link.send(packed[name])
-            self._watch(estimate, now_ns)
+            self._watch(estimate)
         return self._sent()
 
     def inlets(self) -> dict[str, Deliver]:
@@ -136,11 +136,11 @@ class Outlet:
             self._seal.close()
         return self._sent()
 
-    def _watch(self, estimate: Estimate, now_ns: int) -> None:
+    def _watch(self, estimate: Estimate) -> None:
         """Hold an estimate that has gone against the motion of each vehicle that flies."""
         v_N, yaw = self._packer.motion(estimate)
         for spout in self._spouts:
-            spout.dialogue.watch(estimate.t_ns, v_N, yaw, now_ns)
+            spout.dialogue.watch(estimate.t_ns, v_N, yaw)
 
     def _sent(self) -> tuple[Sent, ...]:
         return tuple([record for spout in self._spouts for record in spout.link.sent()])

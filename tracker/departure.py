@@ -18,12 +18,14 @@ from tracker.types import Array, Estimate, TrackState, read_only
 HELD = "held"  # the stage in which a pose waits for later rounds
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True)
 class _Waiting:
     """A pose that was found and has not left yet.
 
     available_ns, since_ns: stopwatch readings when its newest frame stood in memory, and when it was found [ns].
     resets: the reset counter.  stages: what each stage took [ns].
+    exposure_s, doubts_px: what was known of shutters and gammas when its images were looked at, see `reported`.
+    rounds: later ones that were worked off meanwhile.
     """
 
     t_ns: int
@@ -32,6 +34,9 @@ class _Waiting:
     track: TrackState
     resets: int
     stages: dict[str, int]
+    exposure_s: float
+    doubts_px: Array
+    rounds: int = 0
 
 
 class Departure:
@@ -55,29 +60,41 @@ class Departure:
         """Say whether a pose of that instant may still go out: none newer has, or waits to."""
         return t_ns > self._newest_ns
 
-    def take(self, t_ns: int, available_ns: int, track: TrackState, resets: int, stages: dict[str, int]) -> None:
-        """Let a pose of the newest instant that was found stand in line."""
+    def take(
+        self, t_ns: int, available_ns: int, track: TrackState, resets: int, stages: dict[str, int], eyes: Eyes
+    ) -> None:
+        """Let a pose of the newest instant that was found stand in line.
+
+        eyes: what they know now tells how well its balls' centres are known; what they learn later mends none of them.
+        """
         self._newest_ns = t_ns
         since_ns = self._stopwatch() if self._lag_rounds else 0
-        self._waiting.append(_Waiting(t_ns, available_ns, since_ns, track, resets, stages))
+        self._waiting.append(
+            _Waiting(t_ns, available_ns, since_ns, track, resets, stages, eyes.exposure_s, eyes.doubts_px)
+        )
 
-    def due(self, history: History, rig: Rig, eyes: Eyes, moved_px: Array, *, all_of_them: bool) -> list[Estimate]:
-        """Let those go whose time it is, or all.
+    def passed(self, t_ns: int) -> None:
+        """Take note that a round of that instant was worked off, whatever it showed."""
+        for one in self._waiting:
+            one.rounds += t_ns > one.t_ns
+
+    def due(self, history: History, rig: Rig, moved_px: Array, *, all_of_them: bool) -> list[Estimate]:
+        """Let those go whose time it is, or all; not one whose update was taken back and fitted no more.
 
         Args:
             history: of the track that found them.
-            rig, eyes, moved_px: what the cameras are known by now, see `reported`.
+            rig, moved_px: how the cameras that found them stand, see `reported`.
         """
         leaving = []
-        while len(self._waiting) > (0 if all_of_them else self._lag_rounds):
+        while self._waiting and (all_of_them or self._waiting[0].rounds >= self._lag_rounds):
             one = self._waiting.popleft()
             if updates := history.since(one.t_ns):
-                leaving.append(self._estimate(one, updates, rig, eyes, moved_px))
+                leaving.append(self._estimate(one, updates, rig, moved_px))
         return leaving
 
-    def _estimate(self, one: _Waiting, updates: list[Update], rig: Rig, eyes: Eyes, moved_px: Array) -> Estimate:
+    def _estimate(self, one: _Waiting, updates: list[Update], rig: Rig, moved_px: Array) -> Estimate:
         state, found = smoothed(updates), updates[0]
-        covariance, sigmas_s = reported(state, rig, eyes.exposure_s, eyes.doubts_px, moved_px)
+        covariance, sigmas_s = reported(state, rig, one.exposure_s, one.doubts_px, moved_px)
         mean, stages = read_only(state.mean), one.stages
         if self._lag_rounds:
             stages = {**stages, HELD: self._stopwatch() - one.since_ns}

@@ -100,7 +100,7 @@ class Tracker:
         return self._step(harvest)
 
     def finish(self) -> Step:
-        """Work off the round that was still open when the frames ended."""
+        """Work off the round that was still open when the frames ended, and let go what waits."""
         harvest = self._work_off(self._rounds.rest())
         self._let_go(harvest, all_of_them=True)
         return self._step(harvest)
@@ -127,6 +127,8 @@ class Tracker:
         used_before, refused_before = len(harvest.sightings), len(harvest.refused)
         t_ns = max([frame.t_ns for frame in frames])
         self._locate(frames, t_ns, harvest)
+        self._departure.passed(t_ns)
+        self._let_go(harvest)
         state = self._history.newest if self._track is TrackState.TRACKING else None
         used, refused = harvest.sightings[used_before:], harvest.refused[refused_before:]
         health = self._watch.take(frames, used, refused, state, t_ns)
@@ -171,13 +173,12 @@ class Tracker:
         available_ns = max([frame.available_ns for frame in frames])
         stages = harvest.stages(started_ns - available_ns, self._stopwatch() - started_ns)
         self._continuity.went_out(found.state)
-        self._departure.take(found.state.t_ns, available_ns, self._track, self._continuity.resets, stages)
-        self._let_go(harvest)
+        resets = self._continuity.resets
+        self._departure.take(found.state.t_ns, available_ns, self._track, resets, stages, self._eyes)
 
     def _let_go(self, harvest: Harvest, *, all_of_them: bool = False) -> None:
         """Let the poses out whose time it is, or all that wait."""
-        departing = self._departure.due(self._history, self._rig, self._eyes, self._moved_px, all_of_them=all_of_them)
-        harvest.estimates += departing
+        harvest.estimates += self._departure.due(self._history, self._rig, self._moved_px, all_of_them=all_of_them)
 
     def _follow(self, frames: Round, t_ns: int, harvest: Harvest) -> Update | None:
         """Update the track with a round; a late one is put in where it belongs and what came after is done again."""
@@ -187,9 +188,11 @@ class Tracker:
             self._history.remember(result)
         for past in later:
             again = self._study.update(self._ahead(past.t_ns), past.sightings)
-            if isinstance(again, Update):
-                self._history.remember(again)
-                result = again
+            if isinstance(again, Rejected):
+                harvest.rejections.append(again)
+                continue
+            self._history.remember(again)
+            result = again
         return result
 
     def _ahead(self, t_ns: int, clock_breaks: Mapping[int, float] = NO_BREAKS) -> Prediction:

@@ -165,7 +165,8 @@ class Estimate:
 class Step(NamedTuple):  # made for each event
     """What one event did to the tracker.
 
-    estimates are in order of time, each newer than any given before; usually none or one.
+    estimates are in order of time, each newer than any given before; usually none or one. Where poses wait (see
+    `departure`), they are of earlier events than the sightings.
     refused: sightings that did not fit.  health: of the calibration, where the event told something new of it.
     """
 

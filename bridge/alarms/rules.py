@@ -92,7 +92,7 @@ def _latency(now: Readings) -> Iterator[Finding]:
             "",
             verdict,
             f"latency p99 {now.latency_p99_ms or 0:.0f} ms, limit {limit_ms:g} ms",
-            "stop other programs on this computer, or track fewer or smaller images",
+            "stop other programs on this computer, track fewer or smaller images, or lower lag_rounds",
         )
 
 
@@ -104,7 +104,7 @@ def _age(now: Readings) -> Iterator[Finding]:
             "",
             verdict,
             f"poses are {now.age_ms or 0:.0f} ms old when they could leave, limit {limit_ms:g} ms: those are not sent",
-            "this computer falls behind its cameras: lower their frame rate, or check their latency_ms",
+            "lower lag_rounds; where that is 0, this computer falls behind: lower frame rates, or check latency_ms",
         )
 
 

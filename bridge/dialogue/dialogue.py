@@ -203,9 +203,9 @@ class Dialogue:
         self._last_pose_ns = estimate.t_ns
         return True
 
-    def watch(self, t_ns: int, v_N: Sequence[float], yaw: float, now_ns: int) -> None:
+    def watch(self, t_ns: int, v_N: Sequence[float], yaw: float) -> None:
         """Take our velocity [m/s] and yaw [rad] in north-east-down, to be held against the autopilot's tilt."""
-        self._heading.take_pose(t_ns, v_N, yaw, self._watch.armed, now_ns)
+        self._heading.take_pose(t_ns, v_N, yaw, self._watch.armed)
 
     def state(self, now_ns: int) -> DialogueState:
         """Return what is known of the far end."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
 
 from bridge.dialect import enum, make_message, message_id
@@ -15,6 +16,7 @@ ATTITUDE = "ATTITUDE"
 RATE_HZ = 10.0
 ASK_NS = 5_000_000_000
 FRESH_NS = 300_000_000
+KEPT = 256  # tilts: five seconds of them at 50 Hz
 LOOK_NS = 500_000_000
 
 
@@ -24,6 +26,7 @@ class HeadingWatch:
     def __init__(self) -> None:
         self._armed = False
         self._tilt_ns: int | None = None
+        self._tilts: deque[tuple[int, float, float]] = deque(maxlen=KEPT)  # when each came, roll and pitch
         self._asked_ns: int | None = None
         self._begin()
 
@@ -38,19 +41,26 @@ class HeadingWatch:
         roll, pitch = attitude.number("roll"), attitude.number("pitch")
         if not (math.isfinite(roll) and math.isfinite(pitch)):
             return
-        self._watch.take_tilt(roll, pitch)
         self._tilt_ns = attitude.arrived_ns
+        self._tilts.append((self._tilt_ns, roll, pitch))
 
-    def take_pose(self, t_ns: int, v_N: Sequence[float] | Array, yaw: float, armed: bool, now_ns: int) -> None:
+    def take_pose(self, t_ns: int, v_N: Sequence[float] | Array, yaw: float, armed: bool) -> None:
         """Take our velocity, north first [m/s], and yaw [rad] at t_ns; a vehicle in the hand proves nothing.
 
-        armed: whether it may be flying.  now_ns: stream time [ns].
+        It is held against the tilt of its own instant, since a pose may have waited for later rounds: in a circle a
+        later tilt looks like a wrong yaw.
+
+        armed: whether it may be flying.
         """
         if armed != self._armed:
             self._begin()
             self._armed = armed
-        if not armed or self._tilt_ns is None or now_ns - self._tilt_ns > FRESH_NS:
+        tilts = self._tilts
+        while len(tilts) > 1 and abs(tilts[1][0] - t_ns) <= abs(tilts[0][0] - t_ns):
+            tilts.popleft()
+        if not armed or not tilts or abs(tilts[0][0] - t_ns) > FRESH_NS:
             return
+        self._watch.take_tilt(*tilts[0][1:])
         self._watch.take_pose(t_ns, v_N, yaw)
         if self._look_ns is None or t_ns - self._look_ns >= LOOK_NS:
             self._look_ns = t_ns

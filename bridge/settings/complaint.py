@@ -70,7 +70,8 @@ def _limit(found: Mapping[str, Any], unit: str) -> str:
         return f"must be {KINDS[found['type']]}; correct it"
     if found["type"] == "literal_error":
         return f"must be {context['expected']}; correct it"
-    return f"{found['msg'].replace('Input should', 'must').replace('a valid', 'a')}; correct it"
+    said = found["msg"].replace("Input should", "must").replace("a valid integer", "a whole number")
+    return f"{said.replace('a valid', 'a')}; correct it"
 
 
 def _unknown(location: Location, table: Mapping[str, object]) -> str:

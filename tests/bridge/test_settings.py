@@ -211,9 +211,10 @@ def test_bytes_that_are_no_text_are_refused(tmp_path: Path) -> None:
             'fourcc = "MJPEG"',
             "[[rig.cameras]] cam0: fourcc = 'MJPEG': has 5 characters, wanted 4; correct it",
         ),
-        ("width_px = 640", "width_px = 640.5", "[[rig.cameras]] cam0: width_px = 640.5 px: must be a"),
+        ("width_px = 640", "width_px = 640.5", "[[rig.cameras]] cam0: width_px = 640.5 px: must be a whole number"),
         ('method = "ekf"', 'method = "ukf"', "[tracker] method = 'ukf': must be 'ekf' or 'paper'; correct it"),
         ("lag_rounds = 0", "lag_rounds = 16", "[tracker] lag_rounds = 16: must be at most 15"),
+        ("lag_rounds = 0", "lag_rounds = true", "[tracker] lag_rounds = True: must be a whole number"),
         (
             '# messages = ["VISION_POSITION_ESTIMATE"]',
             'messages = ["GPS_INPUT"]',

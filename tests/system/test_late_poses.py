@@ -16,15 +16,16 @@ from tools.bench.trial import Flown, Trial, fly, footage
 from tracker.pipeline import Tracker
 from tracker.scene import Look, Trouble
 from tracker.sources.sim import START_NS, SimTiming
-from tracker.types import Event, Frame, Step
+from tracker.types import Event, Frame, Silence, Step, TrackState
 
 LINEAR = Look(gamma=1.0)
 HALF_A_FRAME_NS = (0, 33_333_333)
 SETTLED_S = 0.5
 SEEDS = (1, 2, 3)
+MOST = 15  # rounds
 AS_GOOD = 1.3  # times the error of triggered cameras
 BLIND_S = (2.0, 3.0)
-COAST_S, ROUND_S = 0.2, 1 / 15
+ROUND_S, COAST_NS = 1 / 15, 200_000_000
 TICK_NS = 1_000
 
 
@@ -91,7 +92,9 @@ def seconds(t_ns: int) -> float:
 
 
 @pytest.mark.parametrize("lag_rounds", [1, 3])
-def test_poses_that_wait_leave_when_the_track_is_lost_and_at_the_end(blinded: Sequence[Event], lag_rounds: int) -> None:
+def test_poses_wait_for_rounds_whatever_these_show_and_leave_at_the_end(
+    blinded: Sequence[Event], lag_rounds: int
+) -> None:
     at_once = [one.t_ns for _, step in steps(0, blinded) for one in step.estimates]
     left = [
         (np.inf if event is None else seconds(event.t_ns), one.t_ns)
@@ -100,9 +103,18 @@ def test_poses_that_wait_leave_when_the_track_is_lost_and_at_the_end(blinded: Se
     ]
     assert [t_ns for _, t_ns in left] == at_once
     assert not any(BLIND_S[0] <= seconds(t_ns) < BLIND_S[1] for t_ns in at_once)
-    before = [left_s for left_s, t_ns in left if seconds(t_ns) < BLIND_S[0]]
-    assert before[-1] <= BLIND_S[0] + COAST_S + 2.0 * ROUND_S
+    waited_s = [left_s - seconds(t_ns) for left_s, t_ns in left if np.isfinite(left_s)]
+    assert max(waited_s) <= (lag_rounds + 0.5) * ROUND_S
     assert [left_s for left_s, _ in left[-lag_rounds:]] == [np.inf] * lag_rounds
+
+
+def test_poses_that_wait_leave_when_the_track_is_lost_in_silence(blinded: Sequence[Event]) -> None:
+    until = [event for event in blinded if seconds(event.t_ns) < BLIND_S[0]]
+    silence = Silence(until[-1].t_ns + 2 * COAST_NS)
+    left = {event: step for event, step in steps(3, [*until, silence]) if isinstance(event, Silence)}
+    assert left[silence].state is TrackState.LOST
+    assert [one.t_ns for one in left[silence].estimates][-1] == until[-1].t_ns
+    assert [one.state for one in left[silence].estimates] == [TrackState.TRACKING] * 3
 
 
 @pytest.mark.parametrize("lag_rounds", [0, 2])
@@ -128,3 +140,17 @@ def test_with_a_late_frame_each_pose_still_leaves_once_and_in_order(blinded: Seq
     at_once, late = ([one.t_ns for _, step in steps(lag, events) for one in step.estimates] for lag in (0, lag_rounds))
     assert late == at_once
     assert late == sorted(set(late))
+
+
+def overtaken(events: Sequence[Event]) -> list[Event]:
+    """Return a flight in which every frame of the second camera comes after the first one's next."""
+    first, second = ([event for event in events if isinstance(event, Frame) and event.camera == c] for c in (0, 1))
+    return [event for pair in zip(first[1:], second, strict=False) for event in pair]
+
+
+def test_where_every_second_frame_is_overtaken_no_pose_is_lost_however_many_rounds_it_waits() -> None:
+    trial = Trial(VEHICLE, SimTiming(15.0, 3.0, offsets_ns=HALF_A_FRAME_NS), LINEAR, seed=1)
+    events = overtaken(list(footage(trial, RIG, None)))
+    at_once, late = ([one.t_ns for _, step in steps(lag, events) for one in step.estimates] for lag in (0, MOST))
+    assert len(at_once) > 2 * MOST
+    assert late == at_once

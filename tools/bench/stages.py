@@ -16,11 +16,12 @@ from bridge.recorder import RecorderState
 from bridge.run import Records, Steps, Watches
 from bridge.telemetry.states import Surroundings
 from bridge.wire import LinkState, Message, Sent
+from tracker.departure import HELD
 from tracker.types import Estimate, Event, Step
 
 Ts = TypeVarTuple("Ts")
 R = TypeVar("R")
-WAIT = "wait"  # of the tracker's stages the one that is no work
+IDLE = frozenset({"wait", HELD})  # of the tracker's stages those that are no work
 
 
 class Stages:
@@ -63,7 +64,7 @@ class TimedTracker:
         rest_ns = self._stopwatch() - started_ns
         for estimate in step.estimates:
             for stage, took_ns in estimate.stages_ns.items():
-                if stage != WAIT:
+                if stage not in IDLE:
                     self._timed.add(stage, took_ns)
                     rest_ns -= took_ns
         self._timed.add("intake", rest_ns)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections import deque
 from dataclasses import dataclass, replace
 
@@ -56,12 +57,10 @@ class History:
             self.restart(newest._replace(state=replace(newest.state, noise=noise)))
 
     def since(self, t_ns: int) -> list[Update]:
-        """Return the update of an instant and those after it; none when it was taken back or is forgotten."""
-        updates = self._updates
-        if updates[-1].state.t_ns == t_ns:  # as it is where poses do not wait
-            return [updates[-1]]
-        later = [update for update in updates if update.state.t_ns >= t_ns]
-        return later if later and later[0].state.t_ns == t_ns else []
+        """Return the last update of an instant and those after it; none when it was taken back or is forgotten."""
+        updates = list(self._updates)
+        first = bisect_right(updates, t_ns, key=_instant) - 1
+        return updates[first:] if first >= 0 and _instant(updates[first]) == t_ns else []
 
     def back_to(self, t_ns: int) -> list[Later]:
         """Take back the updates after an instant that is not forgotten; return them in order of time."""
@@ -70,3 +69,7 @@ class History:
             update = self._updates.pop()
             later.insert(0, Later(update.state.t_ns, update.used))
         return later
+
+
+def _instant(update: Update) -> int:
+    return update.state.t_ns

@@ -182,14 +182,15 @@ def as_gained(levels: Array, of: Array, H: Array, A: Array, B: Array, dt: float,
         for k in range(len(B)):
             if k % MOTIONS != motion:
                 S += means[k] * B[k]
-        seen, raised, gained = _least_seen(S, H, motion), 0.0, 0.0
+        seen, raised, gained, left = _least_seen(S, H, motion), 0.0, 0.0, 0.0
         for level in range(levels.shape[1]):
             bs = 0.0
             for kind in range(KINDS):
                 bs += of[kind * MOTIONS + motion, level] * unit[kind, 0, 0] * seen
             raised += levels[motion, level] * bs
             gained += levels[motion, level] * bs / (1.0 + bs)
+            left += levels[motion, level] / (1.0 + bs)  # 1 - gained, which cancels where pixels show all
         if raised > 0.0:
             for kind in range(KINDS):
-                found[kind * MOTIONS + motion] *= gained / (1.0 - gained) / raised
+                found[kind * MOTIONS + motion] *= gained / left / raised
     return found

@@ -116,3 +116,13 @@ def test_a_level_that_is_certain_keeps_its_strength(level: int) -> None:
 
 def test_without_time_for_a_manoeuvre_the_mean_strength_stands() -> None:
     assert np.array_equal(as_gained(start_levels(), OF, *shown(1), NOTHING, 0.0, T), expected(start_levels(), OF))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_pixels_that_show_all_leave_a_strength_that_is_a_number(seed: int) -> None:
+    """Nothing is left to weigh but the levels: one over the strength is the mean of one over theirs."""
+    (H, A), levels = shown(seed), some_levels(seed)
+    one = as_gained(levels, OF, H, 1e-40 * A, NOTHING, DT, T)
+    for motion in range(MOTIONS):
+        each = OF[motion::MOTIONS].T @ UNIT
+        assert one[motion::MOTIONS] @ UNIT == pytest.approx(1.0 / (levels[motion] @ (1.0 / each)))

@@ -9,6 +9,7 @@ import pytest
 
 from tests.tracker.rigs import PROCESS, at, difference, ring_rig, sightings, state
 from tracker.filter.ekf import Update, update
+from tracker.filter.history import History
 from tracker.filter.matern import carried
 from tracker.filter.predict import first_guess, predict
 from tracker.filter.smooth import smoothed
@@ -76,6 +77,17 @@ def test_the_first_update_of_a_track_tells_nothing_of_what_was_before() -> None:
     _, updates = flight(2, 4)
     assert updates[0].P_ahead is None
     assert updates[1].P_ahead is not None
+
+
+def test_what_a_straggler_adds_to_its_instant_is_not_forgotten() -> None:
+    _, (first, second, third) = flight(3, 6)
+    straggler = second._replace(state=replace(second.state, P=second.state.P / 2.0), P_ahead=None)
+    history = History(lag_rounds=1)
+    for one in (first, second, straggler, third):
+        history.remember(one)
+    assert history.since(second.state.t_ns) == [straggler, third]
+    assert history.since(second.state.t_ns + 1) == []
+    assert history.since(first.state.t_ns - 1) == []
 
 
 def sigmas(one: State) -> Array:

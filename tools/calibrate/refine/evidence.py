@@ -38,16 +38,20 @@ class Evidence:
 
 
 def read_evidence(reader: LogReader, rig: Rig) -> Evidence:
-    """Gather a log's instants."""
+    """Gather a log's instants; of poses that waited for later rounds, what was seen in these is none of theirs."""
     instants: list[Instant] = []
     told_ns: dict[int, int] = {}
     seen: list[BallSighting] = []
+    rows_ns = [
+        camera.readout_ns for camera in rig.cameras
+    ]  # by less than so much a row may be younger than its picture
     for turn in turns(reader):
         seen += (*turn.step.sightings, *turn.step.refused)
         for estimate in turn.step.estimates:
-            if len(seen) >= ENOUGH and len({one.camera for one in seen}) >= 2:
-                instants.append(Instant(_state(estimate, rig), tuple(seen)))
-            seen = []
+            then = tuple(one for one in seen if one.t_ns <= estimate.t_ns + rows_ns[one.camera])
+            seen = [one for one in seen if one.t_ns > estimate.t_ns + rows_ns[one.camera]]
+            if len(then) >= ENOUGH and len({one.camera for one in then}) >= 2:
+                instants.append(Instant(_state(estimate, rig), then))
         if turn.step.health is not None:
             for index, camera in enumerate(turn.step.health.cameras):
                 if camera.moved:
