@@ -42,9 +42,7 @@ def read_evidence(reader: LogReader, rig: Rig) -> Evidence:
     instants: list[Instant] = []
     told_ns: dict[int, int] = {}
     seen: list[BallSighting] = []
-    rows_ns = [
-        camera.readout_ns for camera in rig.cameras
-    ]  # by less than so much a row may be younger than its picture
+    rows_ns = [camera.readout_ns for camera in rig.cameras]  # a row may be younger than its picture by less than that
     for turn in turns(reader):
         seen += (*turn.step.sightings, *turn.step.refused)
         for estimate in turn.step.estimates:
