@@ -9,7 +9,6 @@ import orjson
 import typer
 
 from tools.commands.common import ConfigOption, JsonOption
-from tools.kept import keep
 from tools.suffix import check_suffix
 from tracker.errors import OperatorError
 
@@ -33,6 +32,7 @@ def sysid(
         raise OperatorError(f"--model {model}: unknown; known are {', '.join(MODELS)}")
     from bridge.log.reader import LogReader
     from bridge.settings import load_settings
+    from tools.kept import keep
     from tools.sysid.log_data import read_log
     from tools.sysid.session import identify_log, to_table
 
@@ -73,6 +73,7 @@ def excite(
     from tools.excite.picture import draw_plan
     from tools.excite.plan import make_plan
     from tools.excite.plan_file import write_plan
+    from tools.kept import keep
 
     keep((config_path(config),), out, "--out")
     check_suffix(out, "--out", ".toml")

@@ -7,7 +7,7 @@ other never become Python's, which takes longer than to fill them.
 from __future__ import annotations
 
 from tracker.filter.batch import Sighted, compared, distances2
-from tracker.filter.fit import Fit, prepared, solved, tilt_variance
+from tracker.filter.fit import Fit, looks_alone, prepared, solved, tilt_variance
 from tracker.filter.manoeuvre import envelope, strengths
 from tracker.filter.measure import Indices, camera_table
 from tracker.filter.predict import Prediction
@@ -54,6 +54,9 @@ def _at_once(
     near = True
     for distance2 in distances2(y, A, B, tops):
         near = near and distance2 <= limit
-    levels, P, R, doubtful = prepared(levels, of, y, H, A, B, R, path, doubt, P_coasted, dt, T, tilt, True, False)
+    alone = looks_alone(cameras)
+    levels, P, R, doubtful = prepared(
+        levels, of, y, H, A, B, R, path, doubt, P_coasted, dt, T, tilt, True, alone, False
+    )
     stands, turn_open, dx, H, u, inverse, nis = solved(mean, P, T, z, R, cameras, balls, lags_s, table, points_inB)
     return near and stands and not (doubtful or turn_open), levels, P, dx, H, R, u, inverse, nis

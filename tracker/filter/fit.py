@@ -69,7 +69,8 @@ def fit(ahead: Prediction, batch: Batch, rig: Rig, *, adapt: bool = True) -> Fit
     process, n = ahead.process, len(batch.y)
     levels, P, R, doubtful = prepared(
         ahead.state.levels, manoeuvre.strengths(process), batch.y, batch.H, batch.A, batch.B, batch.R, batch.path,
-        batch.doubt, ahead.P_coasted, ahead.dt, process.manoeuvre_s, tilt_variance(ahead), adapt, ahead.turn_open,
+        batch.doubt, ahead.P_coasted, ahead.dt, process.manoeuvre_s, tilt_variance(ahead), adapt,
+        looks_alone(batch.sighted.cameras), ahead.turn_open,
     )  # fmt: skip
     agreed = None if doubtful and _clock_open(batch) else _fitted(ahead, batch, rig, levels, P, R)
     if not doubtful:
@@ -88,15 +89,17 @@ def tilt_variance(ahead: Prediction) -> float:
 
 @compiled("Tuple((f8[:, ::1], f8[:, ::1], f8[:, ::1], b1))(f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1],"
           " f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[:, ::1], f8, f8, f8, b1,"
-          " b1)")  # fmt: skip
+          " b1, b1)")  # fmt: skip
 def prepared(
     levels: Array, of: Array, y: Array, H: Array, A: Array, B: Array, R_pixels: Array, path: Array, doubt: Array,
-    P_coasted: Array, dt: float, T: float, tilt: float, adapt: bool, unseen: bool,
+    P_coasted: Array, dt: float, T: float, tilt: float, adapt: bool, alone: bool, unseen: bool,
 ) -> tuple[Array, Array, Array, bool]:  # fmt: skip
     """Return levels, prior covariance, noise of pixels and tilt, and whether the doubt of the clocks matters.
 
-    tilt: variance of roll and of pitch.  unseen: whether a turn is open; then axes that are seen to be quiet do not
-    tell whether it is, and the level of rotation is only raised.  The others as `Batch`, `Prediction` and `manoeuvre`
+    tilt: variance of roll and of pitch.  alone: whether one camera looks. Its speed and its clock explain each other,
+    so what a manoeuvre did is seen less well than its pixels say, and the levels' mean strength stands.
+    unseen: whether a turn is open; then axes that are seen to be quiet do not tell whether it is, and the level of
+    rotation is only raised.  The others as `Batch`, `Prediction` and `manoeuvre`
     name them.
     """
     n = len(y)
@@ -104,7 +107,7 @@ def prepared(
         before, levels = levels, judged(levels, log_likelihoods(y, A, B, of, expected(levels, of)))
         if unseen and expected(levels, of)[1] < expected(before, of)[1]:
             levels[1] = before[1]
-    means = as_gained(levels, of, H, A, B, dt, T)
+    means = expected(levels, of) if alone else as_gained(levels, of, H, A, B, dt, T)
     R, noise, doubts = np.zeros((n + TILT_ROWS, n + TILT_ROWS)), 0.0, 0.0
     for i in range(n):
         for j in range(n):
@@ -118,15 +121,19 @@ def prepared(
     return levels, P, R, not doubts < LEAST_DOUBT * noise
 
 
+@compiled("b1(i8[::1])")
+def looks_alone(cameras: Indices) -> bool:
+    """Say whether all sightings are one camera's."""
+    return bool((cameras == cameras[0]).all())
+
+
 def _clock_open(batch: Batch) -> bool:
     """Say whether a camera looks alone while speed times clock offset, both unknown, moves what it sees by much.
 
     It shows no instant that clocks could agree on; taken at its word it makes a wrong speed and a wrong offset that
     bear each other out.
     """
-    cameras = batch.sighted.cameras
-    alone = bool((cameras == cameras[0]).all())
-    return alone and float(np.trace(batch.doubt)) > len(batch.y) * CLOCK_OPEN_PX**2
+    return looks_alone(batch.sighted.cameras) and float(np.trace(batch.doubt)) > len(batch.y) * CLOCK_OPEN_PX**2
 
 
 def _likelier(agreed: Fit | None, doubted: Fit | None) -> Fit | None:
