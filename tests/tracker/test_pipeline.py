@@ -216,8 +216,8 @@ def test_a_late_frame_is_put_in_where_it_belongs() -> None:
     late = [*in_order[:9], in_order[10], in_order[11], in_order[9], *in_order[12:]]
     ordered, shuffled = (estimates(flown(tracker(), events)) for events in (in_order, late))
     assert [e.t_ns for e in shuffled] == [e.t_ns for e in ordered]
-    # Light and blur were learned in another order, nothing else differs. By these the manoeuvre's levels are judged, and
-    # variances go with their strength.
+    # Light and blur were learned in another order, nothing else differs. By these the manoeuvre's levels are judged,
+    # and variances go with their strength.
     after = difference(as_state(ordered[-1]), as_state(shuffled[-1]))
     assert np.abs(after[:3]).max() < 1e-4
     assert np.abs(after[3:6]).max() < 1e-3
