@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
+TOO_BRIGHT = 0.4  # of a ball's pixels, too bright for the camera: beyond, it teaches nothing of the light
+
 
 class Witness(StrEnum):
     """What the room behind the vehicle tells of a camera."""

@@ -11,6 +11,7 @@ from bridge.alarms.link_rules import LINK_RULES
 from bridge.alarms.readings import CameraReading, Readings
 from bridge.alarms.rule import Finding, Level, Rule, Verdict, above, below
 from tracker.health.background import LIMIT_PX
+from tracker.standing import TOO_BRIGHT
 from tracker.types import TrackState
 
 SETTLE_S = 3.0
@@ -20,7 +21,7 @@ GAP_MS, GAP_SEVERE_MS = 100.0, 300.0
 NIS_HIGH, NIS_LOW = 2.0, 0.4
 SILENT_MS = 500.0
 UNSEEN_S = 3.0
-FULL_SHARE, FULL_SHARE_BACK = 0.4, 0.3  # of balls' pixels: a ball so bright teaches nothing of the light
+NO_LONGER_BRIGHT = 0.3  # of a ball's pixels
 BLIND_S = 5.0
 SOUGHT_S = 5.0
 OFFSET_MS, OFFSET_SIGMAS, OFFSET_KNOWN_MS = 3.0, 4.0, 1.5
@@ -156,13 +157,13 @@ def _camera_blind(now: Readings) -> Iterator[Finding]:
 
 def _overexposed(now: Readings) -> Iterator[Finding]:
     for camera in now.cameras:
-        verdict = above(camera.full_share, FULL_SHARE, FULL_SHARE_BACK)
+        verdict = above(camera.full_share, TOO_BRIGHT, NO_LONGER_BRIGHT)
         if verdict is not Verdict.GOOD:
             yield Finding(
                 camera.name,
                 verdict,
                 f"{camera.name} is overexposed: {camera.full_share:.0%} of the balls' pixels are too bright for it, "
-                f"limit {FULL_SHARE:.0%}; poses are less exact",
+                f"limit {TOO_BRIGHT:.0%}; poses are less exact",
                 "shorten its exposure or lower its gain, or dim the lamps, until no ball is white in its picture",
             )
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from tracker.filter.clocks import given_clocks
-from tracker.filter.correction import gathered_noise, innovation_covariance, path_noise
+from tracker.filter.correction import gathered_noise, path_noise
 from tracker.filter.manoeuvre import envelope
 from tracker.filter.matern import MOTIONS, unit_noise
 from tracker.filter.measure import Indices, camera_table, pixels
@@ -16,6 +16,7 @@ from tracker.filter.noise import ALIKE, APART
 from tracker.filter.predict import Prediction
 from tracker.filter.sag import sag_noise
 from tracker.maths.compiled import compiled
+from tracker.maths.covariance import propagated
 from tracker.rig import Rig
 from tracker.state import OFFSETS
 from tracker.types import Array, BallSighting
@@ -175,7 +176,7 @@ def _covariances(
     for k in range(len(B)):
         B[k] = path[k] + gathered_noise(H, unit[k // MOTIONS], k % MOTIONS)
     doubt = _doubt(P, given_clocks(P), H, cameras)
-    return R, innovation_covariance(H, P, R + doubt), B, path, doubt
+    return R, propagated(H, P, R + doubt), B, path, doubt
 
 
 @compiled("Tuple((f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1]))"

@@ -11,9 +11,9 @@ import math
 
 import numpy as np
 
-from tracker.filter.correction import inverse_of
 from tracker.filter.measure import camera_table
 from tracker.maths.compiled import compiled
+from tracker.maths.covariance import inverse_of
 from tracker.rig import Rig
 from tracker.state import State
 from tracker.types import Array

@@ -22,10 +22,10 @@ from filterpy.kalman import KalmanFilter
 
 from tracker.filter.at_once import fit_at_once
 from tracker.filter.batch import Batch, Sighted, make_batch, sighted
-from tracker.filter.correction import inverse_of
 from tracker.filter.fit import Fit, fit
 from tracker.filter.posterior import settled
 from tracker.filter.predict import Prediction, at_origin
+from tracker.maths.covariance import inverse_of
 from tracker.maths.gate import chi2_limit
 from tracker.rig import Rig
 from tracker.state import State

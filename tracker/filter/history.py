@@ -58,6 +58,8 @@ class History:
 
     def since(self, t_ns: int) -> list[Update]:
         """Return the last update of an instant and those after it; none when it was taken back or is forgotten."""
+        if self._updates and _instant(self._updates[-1]) == t_ns:  # as it is where poses do not wait
+            return [self._updates[-1]]
         updates = list(self._updates)
         first = bisect_right(updates, t_ns, key=_instant) - 1
         return updates[first:] if first >= 0 and _instant(updates[first]) == t_ns else []

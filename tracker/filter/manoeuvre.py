@@ -15,9 +15,9 @@ from functools import lru_cache
 
 import numpy as np
 
-from tracker.filter.correction import factor, forward
 from tracker.filter.matern import KINDS, MOTIONS, unit_noise
 from tracker.maths.compiled import compiled
+from tracker.maths.covariance import factor, forward
 from tracker.state import Process
 from tracker.types import Array
 

@@ -16,8 +16,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from tracker.filter.correction import inverse_of
 from tracker.maths.compiled import compiled
+from tracker.maths.covariance import inverse_of
 from tracker.types import Array
 
 LEAST_OPEN_TURN_RAD = 0.01  # one sigma: below it, circle and tangent are the same to the pixels

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from tracker.filter.clocks import taught
-from tracker.filter.correction import innovation_covariance, moved, moved_slope
+from tracker.filter.correction import moved, moved_slope
 from tracker.filter.measure import Indices
 from tracker.filter.noise import learned
 from tracker.maths.compiled import compiled
+from tracker.maths.covariance import propagated
 from tracker.types import Array
 
 
@@ -30,5 +31,5 @@ def settled(
     E, J_r = np.empty((3, 3)), np.empty((3, 3))
     now = moved(mean, dx, E, J_r)
     turn = moved_slope(mean, now, E, J_r, len(P))
-    after = innovation_covariance(turn, P, np.zeros(P.shape))
+    after = propagated(turn, P, np.zeros(P.shape))
     return now, after, learned(noise, cameras, u, inverse)

@@ -16,9 +16,9 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from tracker.filter.correction import factor, forward, innovation_covariance, inverse_of
 from tracker.health.sample import MOTION, Sample
 from tracker.maths.compiled import compiled
+from tracker.maths.covariance import factor, forward, inverse_of, propagated
 from tracker.maths.solve import dot
 from tracker.rig import Rig
 from tracker.types import Array
@@ -134,7 +134,7 @@ def _variance(index: int, place_m: float, turn_rad: float) -> float:
 def _log_likelihood(e: Array, N: Array, Q: Array) -> float:
     """Return the logarithm of a sample's likelihood, see `_explained`."""
     B = factor(Q).T.copy()
-    S = factor(innovation_covariance(B, N, np.eye(len(e))))
+    S = factor(propagated(B, N, np.eye(len(e))))
     seen = np.zeros((len(e), 1))
     for i in range(len(e)):
         seen[i, 0] = dot(B[i], e)

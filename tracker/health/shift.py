@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tracker.filter.correction import inverse_of
 from tracker.maths.compiled import compiled
+from tracker.maths.covariance import inverse_of
 from tracker.maths.solve import dot
 from tracker.types import Array
 

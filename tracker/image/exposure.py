@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from tracker.maths.compiled import compiled
+from tracker.standing import TOO_BRIGHT
 from tracker.types import Image
 
 CLIPPED = 254  # grey level at which a channel is full
@@ -17,7 +18,6 @@ Weights = tuple[float, float, float]
 """How much blue, green and red count in brightness; a tuple, since to hand over an array takes eleven numbers."""
 LUMA_WEIGHTS: Weights = (0.114, 0.587, 0.299)  # ITU-R BT.601
 FULL_SHARE = 0.35  # of a ball's pixels that may be full in a channel that counts: JPEG blurs the others more
-TEACHES_SHARE = 0.4  # of a ball's pixels that may be full in one that teaches
 
 
 @compiled("f8(UniTuple(f8, 3), f8, f8, f8)", inline=True)
@@ -94,4 +94,4 @@ def overexposed(image: Image, u: float, v: float, radius_px: float) -> bool:
 
     Light learned from what is left of such balls was wrong, and moved the centres of all balls by a pixel.
     """
-    return full_share(image, u, v, radius_px) > TEACHES_SHARE
+    return full_share(image, u, v, radius_px) > TOO_BRIGHT

@@ -15,11 +15,11 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from tracker.filter.correction import innovation_covariance
 from tracker.image.harmonics import LAMBERT, TERMS, turned
 from tracker.image.lamps import explained
 from tracker.image.template import GLOSS, Shades, Vector
 from tracker.maths.compiled import compiled
+from tracker.maths.covariance import propagated
 from tracker.maths.solve import dot
 from tracker.types import Array
 
@@ -114,7 +114,7 @@ def _add(
     Source: pixels are s T e with paint s and terms e, linearised about today's e and the s that fits it best.
     """
     turn = turned(R_RtoW)
-    more, aim, shown = innovation_covariance(turn, seen, np.zeros((TERMS, TERMS))), np.zeros(TERMS), np.zeros(TERMS)
+    more, aim, shown = propagated(turn, seen, np.zeros((TERMS, TERMS))), np.zeros(TERMS), np.zeros(TERMS)
     for i in range(TERMS):
         aim[i], shown[i] = dot(turn[i], seen_target), dot(more[i], terms)
     squares, common = dot(terms, shown), dot(terms, aim)
