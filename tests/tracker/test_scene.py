@@ -11,8 +11,9 @@ import pytest
 from tests.tracker.paper_rig import paper_rig
 from tracker.maths import so3
 from tracker.rig import Rig
-from tracker.scene import Look, Occluder, Pose, SceneRenderer, Sphere, Trouble, hand
+from tracker.scene import Lamp, Look, Occluder, Pose, SceneRenderer, Sphere, Trouble, hand
 from tracker.scene.ball import BallPainter, RayMap
+from tracker.scene.made_up import made_up_look
 from tracker.types import Array, Image
 
 HEIGHT, WIDTH = 480, 640
@@ -225,3 +226,28 @@ def test_a_broken_picture_is_whole_above_and_garbage_below(rig: Rig) -> None:
     whole, broken = (quiet_picture(rig, trouble) for trouble in (Trouble(), Trouble(broken_from=0.4)))
     assert np.array_equal(whole[:192], broken[:192])
     assert np.abs(whole[192:] - broken[192:]).mean() > 10.0
+
+
+def test_a_lamp_that_hangs_near_lights_by_the_square_of_the_distance(rig: Rig) -> None:
+    """Lit from where the camera stands, a ball is brightest in its middle, and as bright as the distance says."""
+    eye, radius_m = rig.cameras[0], 0.0075
+    x, y, z = (0.4 * eye.p_CinW).tolist()
+    lamp = Lamp((x, y, z), 0.8)
+    dark = replace(QUIET, ambient=0.0, diffuse=0.0, specular=0.0)
+    painter = BallPainter(eye, RayMap(eye), [radius_m], [(255, 255, 255)], replace(dark, lamps=(lamp,)))
+    for place in ((0.0, 0.0, 0.0), (0.0, 0.0, 0.3), (0.2, 0.1, 0.2)):
+        p_inC, uv_px = eye.in_camera(np.array([place])), eye.project(np.array([place]))[0]
+        stamp = painter.paint(p_inC[None], uv_px[None])[0][0]
+        assert stamp is not None
+        covered = stamp.layer[..., 3] > 0.99
+        nearer = np.linalg.norm(lamp.p_inW) / np.linalg.norm(np.array(lamp.p_inW) - place)
+        assert stamp.layer[..., :3][covered].max() == pytest.approx(0.8 * nearer**2, rel=0.05)
+
+
+def test_balls_of_made_up_rooms_are_neither_full_nor_dark() -> None:
+    for seed in range(50):
+        look = made_up_look(seed, 1.0)
+        assert look == made_up_look(seed, 1.0)
+        assert 0.5 < look.on_average < 0.95
+        assert all(lamp.p_inW[2] > 0.5 for lamp in look.lamps)
+    assert len({made_up_look(seed, 1.0) for seed in range(50)}) == 50

@@ -1,8 +1,8 @@
 """Whether the filter's own figures of its errors are true: a Monte Carlo through rendered cameras.
 
-Each run flies another made-up path in another room with other noise. Errors of neighbouring instants have much in
-common, which would make a band for independent ones too narrow; so only a few instants of each run count, INSTANTS_S,
-a second apart, after the light has been learned.
+Each run flies another made-up path in another made-up room: other light, lens, sensor and noise. Errors of neighbouring
+instants have much in common, which would make a band for independent ones too narrow; so only a few instants of each
+run count, INSTANTS_S, a second apart, after the light has been learned.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from scipy.stats import chi2
 
 from tools.bench.crew import fly_all
 from tools.bench.trial import Flown, Trial
-from tracker.scene import Look
+from tracker.scene.made_up import made_up_look
 from tracker.sources.sim import SimTiming
 from tracker.state import ATTITUDE, POSITION, RATE, VELOCITY
 from tracker.types import Array
@@ -68,8 +68,8 @@ class Consistency:
 
 def measure_consistency(seeds: int, gamma: float) -> Consistency:
     """Fly that many seeds. gamma: of the simulated cameras."""
-    look, timing = Look(gamma=gamma), SimTiming(15.0, DURATION_S)
-    runs = fly_all([Trial(f"random-{seed}", timing, look, seed) for seed in range(seeds)])
+    timing = SimTiming(15.0, DURATION_S)
+    runs = fly_all([Trial(f"random-{seed}", timing, made_up_look(seed, gamma), seed) for seed in range(seeds)])
     return judged(runs, gamma)
 
 

@@ -11,7 +11,7 @@ from bridge.settings import Settings, rig_of
 from tools.bench.crew import fly_all
 from tools.bench.ring import ring_rig
 from tools.bench.trial import Flown, Trial
-from tracker.scene import Look
+from tracker.scene import Lamp, Look
 from tracker.sources.sim import SimTiming
 
 SETTLED_S = 0.5
@@ -57,6 +57,8 @@ def _cases(settings: Settings, seed: int) -> Iterator[tuple[str, Trial]]:
     yield "gamma 2.2", replace(plain, look=SCREEN)
     for name, lamp in LAMPS.items():
         yield name, replace(plain, look=replace(LINEAR, lamp_inW=lamp))
+    near = Lamp((0.5, -0.6, 0.9), 0.9)
+    yield "lamp near", replace(plain, look=replace(LINEAR, ambient=0.2, diffuse=0.1, specular=0.01, lamps=(near,)))
     yield "hard light", replace(plain, look=replace(LINEAR, ambient=0.2, diffuse=1.1, specular=0.4))
     yield "flat light", replace(plain, look=replace(LINEAR, ambient=0.95, diffuse=0.1, specular=0.0))
     yield "dim, noisy", replace(plain, look=replace(LINEAR, full_well_e=800.0, read_noise=0.004))

@@ -4,10 +4,10 @@ Nothing here is shared with the detector: colour is made by light, paint and sen
 ray-traced, not drawn as a circle.
 """
 
-from tracker.scene.look import Look
+from tracker.scene.look import Lamp, Look
 from tracker.scene.render import SceneRenderer
 from tracker.scene.thing import Bar, Sphere, hand
 from tracker.scene.trouble import Knock, Occluder, Trouble
 from tracker.scene.vehicle import Pose
 
-__all__ = ["Bar", "Knock", "Look", "Occluder", "Pose", "SceneRenderer", "Sphere", "Trouble", "hand"]
+__all__ = ["Bar", "Knock", "Lamp", "Look", "Occluder", "Pose", "SceneRenderer", "Sphere", "Trouble", "hand"]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.camera import Camera
-from tracker.scene.look import Look
+from tracker.scene.look import Lamp, Look
 from tracker.scene.sensor import Plane, to_light
 from tracker.types import Array
 
@@ -72,6 +72,7 @@ class BallPainter:
         self._look = look
         lamp_inW = np.array(look.lamp_inW) / np.linalg.norm(look.lamp_inW)
         self._lamp_inC = camera.R_CtoW.T @ lamp_inW
+        self._lamps = [(camera.in_camera(np.array([lamp.p_inW]))[0], _strength(lamp)) for lamp in look.lamps]
         self._up_inC = camera.R_CtoW[2]
 
     def paint(self, p_inC: Array, uv_px: Array, repainted: Sequence[tuple[int, Bgr]] = ()) -> list[list[Stamp | None]]:
@@ -127,17 +128,34 @@ class BallPainter:
 
     def _shade(self, normal: tuple[Array, Array, Array], p_inC: Array) -> tuple[Array, Array]:
         """Return matt and mirrored light (k, n, s). Source: Blinn, "Models of light reflection", SIGGRAPH 1977."""
-        look = self._look
-        half = self._lamp_inC - p_inC[0] / np.linalg.norm(p_inC[0])
-        half /= np.linalg.norm(half)
-        lamp, up, gloss = (_dot(normal, axis) for axis in (self._lamp_inC, self._up_inC, half))
-        matt = look.ambient * (0.75 + 0.25 * up) + look.diffuse * np.maximum(lamp, 0.0)
-        gloss = np.maximum(gloss, 0.0) ** 2
-        for _ in range(5):
-            gloss = gloss * gloss
-        return matt, look.specular * gloss
+        look, up = self._look, _dot(normal, self._up_inC)
+        matt = look.ambient * (0.75 + 0.25 * up) + look.diffuse * np.maximum(_dot(normal, self._lamp_inC), 0.0)
+        mirror = look.specular * _gloss(normal, self._lamp_inC, p_inC[0])
+        for lamp_inC, strength_m2 in self._lamps:
+            away = lamp_inC - p_inC
+            distance_m = np.linalg.norm(away, axis=1)[:, None]
+            facing = _dot(normal, (away / distance_m).T[:, :, None, None])
+            share = strength_m2 / distance_m[:, :, None] ** 2
+            matt += share * np.maximum(facing, 0.0)
+            mirror += look.glossiness * share * _gloss(normal, away[0] / distance_m[0], p_inC[0])
+        return matt, mirror
+
+
+def _gloss(normal: tuple[Array, Array, Array], lamp_inC: Array, p_inC: Array) -> Array:
+    """Return a lamp's mirror image (k, n, s) in a ball at p_inC (3,), 1 where it is brightest. lamp_inC: (3,) unit."""
+    half = lamp_inC - p_inC / np.linalg.norm(p_inC)
+    half /= np.linalg.norm(half)
+    gloss = np.maximum(_dot(normal, half), 0.0) ** 2
+    for _ in range(5):
+        gloss = gloss * gloss
+    return gloss
+
+
+def _strength(lamp: Lamp) -> float:
+    """Return a lamp's share of light at 1 m [m^2]."""
+    return lamp.share * float(np.dot(lamp.p_inW, lamp.p_inW))
 
 
 def _dot(v: tuple[Array, Array, Array], axis: Array) -> Array:
-    """Return the scalar product of a field of vectors with one direction (3,)."""
+    """Return the scalar product of a field of vectors with one direction (3,), or one for each ball (3, k, 1, 1)."""
     return np.asarray(v[0] * axis[0] + v[1] * axis[1] + v[2] * axis[2])

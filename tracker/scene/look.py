@@ -6,12 +6,25 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
+class Lamp:
+    """A lamp that hangs in the room at p_inW [m], its light the same to all sides.
+
+    share: of light that it throws on what faces it at W's origin; it falls with the distance squared.
+    """
+
+    p_inW: tuple[float, float, float]
+    share: float
+
+
+@dataclass(frozen=True, slots=True)
 class Look:
     """Light, lens and sensor of every simulated camera.
 
     Values were set beside the lab recordings: balls of 5 to 6 px, noise of 2 to 3 levels of 255.
-    lamp_inW: direction towards the main lamp in the room, any length.
-    ambient, diffuse, specular: shares of light from everywhere, from the lamp, and mirrored by the paint.
+    lamp_inW: direction towards the main lamp, any length: far away, a window or the sky.
+    ambient, diffuse: shares of light from everywhere, and from the main lamp.
+    specular: share of the light that the paint mirrors of the main lamp; of others in proportion.
+    lamps: further ones, near enough that the light differs by place.
     blur_px: one sigma of the lens's point spread [px].
     exposure_s: time the shutter is open [s].  sub_exposures: instants it is split into; 1 freezes the motion.
     full_well_e: electrons of a white pixel; their square root is the shot noise.
@@ -26,6 +39,7 @@ class Look:
     ambient: float = 0.42
     diffuse: float = 0.80
     specular: float = 0.15
+    lamps: tuple[Lamp, ...] = ()
     blur_px: float = 0.5
     exposure_s: float = 0.004
     sub_exposures: int = 5
@@ -34,3 +48,13 @@ class Look:
     chroma_noise: float = 0.5
     jpeg_quality: int = 0
     gamma: float = 2.2
+
+    @property
+    def glossiness(self) -> float:
+        """Return what the paint mirrors of a lamp beside what it throws back matt."""
+        return self.specular / self.diffuse if self.diffuse > 0.0 else 0.0
+
+    @property
+    def on_average(self) -> float:
+        """Return the light that falls on a piece of any direction about W's origin."""
+        return self.ambient + 0.5 * (self.diffuse + sum(lamp.share for lamp in self.lamps))

@@ -88,7 +88,7 @@ class ThingPainter:
         p_inC, uv_px = self._camera.in_camera(ends), self._camera.project(ends)[0]
         if not np.isfinite(uv_px).all():
             return
-        light = self._look.ambient + 0.5 * self._look.diffuse
+        light = self._look.on_average
         painter = RodPainter(self._camera, Rod(ends[0], ends[1], bar.radius_m, bar.bgr), light, self._look.gamma)
         stamps = painter.paint(uv_px[None], float(p_inC[:, 2].mean()))
         if stamps is not None:

@@ -31,7 +31,7 @@ class VehiclePainter:
 
     def __init__(self, camera: Camera, marker: Marker, look: Look) -> None:
         rods = airframe(marker)
-        light = look.ambient + 0.5 * look.diffuse
+        light = look.on_average
         self._camera = camera
         rays = RayMap(camera)
         radii_m, colours = [ball.radius_m for ball in marker.balls], [ball.colour.bgr for ball in marker.balls]
