@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tools.bench.trial import Trial, fly
-from tracker.scene import Look
+from tracker.scene import Lamp, Look
 from tracker.sources.sim import SimTiming
 
 DIM = Look(
@@ -22,6 +22,14 @@ DIM = Look(
 BRIGHT = Look((-0.25, -0.38, 0.63), 0.52, 0.89, 0.13, blur_px=0.78, sub_exposures=9, gamma=1.8)
 FROM_THE_SIDE = Look((0.9, 0.4, 0.5), 0.35, 0.85, 0.25, blur_px=0.4, exposure_s=0.002, full_well_e=1500.0)
 SOFT = Look((0.1, 0.2, 1.0), 0.55, 0.55, 0.0, blur_px=0.6, full_well_e=8000.0, gamma=1.0)
+A_LAMP_NEAR = Look(ambient=0.2, diffuse=0.1, specular=0.01, lamps=(Lamp((0.5, -0.6, 0.9), 0.9),), gamma=1.0)
+TWO_NEAR = Look(
+    ambient=0.17,
+    diffuse=0.05,
+    specular=0.0,
+    lamps=(Lamp((-1.0, 0.8, 0.9), 0.6), Lamp((0.8, 0.5, 1.2), 0.4)),
+    gamma=1.0,
+)
 ROOMS = {"dim": DIM, "bright": BRIGHT, "lit from the side": FROM_THE_SIDE, "lit softly": SOFT}
 
 
@@ -31,3 +39,10 @@ def test_the_light_is_learned_so_well_that_no_pose_is_wrong(look: Look) -> None:
     assert len(flown) > 48
     assert not flown.wrong()
     assert flown.position_mm.mean() < 0.3
+
+
+@pytest.mark.parametrize("look", [A_LAMP_NEAR, TWO_NEAR], ids=["a lamp near", "two near"])
+def test_a_lamp_that_hangs_near_is_known_at_every_place(look: Look) -> None:
+    flown = fly(Trial("random-12", SimTiming(15.0, 5.0), look, seed=4))
+    assert not flown.wrong()
+    assert flown.between(1.5, 5.0).position_mm.mean() < 0.2

@@ -12,7 +12,7 @@ from tracker.camera import Camera
 from tracker.image.centre import Centre
 from tracker.image.holder import without_holders
 from tracker.image.lesson import light_on, sample_of, sharper
-from tracker.image.light import Light, ray_frame
+from tracker.image.light import MIDDLE, Light, ray_frame
 from tracker.image.patch import Expected, Response, cut, detail_of, extent_of
 from tracker.image.template import FLAT, Shades
 from tracker.types import Array, Image
@@ -57,8 +57,21 @@ class Appearance:
         shades = self.shades(camera, *_ray(ball, camera))
         return replace(ball, uv_px=place, shades=shades, response=self.response, drawn=None)
 
+    def at(self, place_m: Array) -> Appearance:
+        """Return it at a place (3,) from the room's middle in W [m]; the same where the light is hardly another."""
+        if not self.shown.count:
+            return self
+        shown = to_show(self.light.at(place_m), self.shown)
+        return self if shown is self.shown else replace(self, shown=shown)
+
     def learned(
-        self, image: Image, camera: Camera, ball: Expected, found: Centre, others: Iterable[Light] = ()
+        self,
+        image: Image,
+        camera: Camera,
+        ball: Expected,
+        found: Centre,
+        others: Iterable[Light] = (),
+        place_m: Array = MIDDLE,
     ) -> Appearance:
         """Return what is known after one more ball.
 
@@ -66,6 +79,7 @@ class Appearance:
             image: the camera's, BGR.
             ball, found: what was expected of the ball and what its fit gave.
             others: what other cameras learned of the room's light, asked for only when it is due.
+            place_m: (3,) where the ball was, from the room's middle in W.
         """
         if found.misfit > MISFIT_MAX:
             return self
@@ -76,10 +90,10 @@ class Appearance:
         detail = response.detail + DETAIL_SHARE * (detail_of(image, extent) - response.detail)
         response = replace(response, detail=detail)
         R_RtoW = ray_frame(*_ray(ball, camera), camera.R_CtoW)
-        light = self.light.learned(*light_on(sample, self.light.lamp_seen(R_RtoW)), R_RtoW)
+        light = self.light.learned(*light_on(sample, self.light.lamp_seen(R_RtoW)), R_RtoW, place_m)
         if not (light.trusted and _due(light.count)):
             return Appearance(response, light, self.shown)
-        light = light.solved(others)
+        light = light.solved(others, place_m)
         return Appearance(response, light, to_show(light, self.shown))
 
 

@@ -19,7 +19,7 @@ from tracker.image.tint import NEUTRAL, Gains, Tint, core_colour
 from tracker.image.view import RADIUS, unknown_streak_px, whereabouts
 from tracker.rig import Rig
 from tracker.state import State
-from tracker.types import BallSighting, Frame
+from tracker.types import Array, BallSighting, Frame
 
 LIGHT_BALLS = 2  # a single ball that is something else would tell of a light that is not there
 LEARN_ALL = 108  # balls of each camera under its gamma; then
@@ -27,6 +27,7 @@ LEARN_EVERY = 5  # rounds one ball: odd, for free-running cameras have rounds in
 BLIND_PX = 0.5  # of the streak's sigma: how fast the balls move is not known
 SMEAR_DOUBT = 0.1  # of an unknown smear: what it moves the centre of a shaded ball, one sigma
 SMEARED = 0.5  # radii: a ball smeared further leaves something at the ends of its streak
+PLACE_STEP_M = 0.1  # of the vehicle: closer together, balls look alike in any light
 LONG_STREAK_PX = 0.7  # an image smeared further than this, taken for a still one, teaches wrong
 
 
@@ -50,6 +51,8 @@ class Eyes:
             gaze_of(rig, Appearance(), album, room=behind.room)
             for album, behind in zip(self._albums, self._behind, strict=True)
         ]
+        self._middle_m: Array | None = None  # of the room, about which its light is known: where the first ball taught
+        self._place_m = np.zeros(3)  # from there, where balls look as is known now
         self._turn = 0
         self._taught_blindly = False
         self._sum_up()
@@ -98,6 +101,7 @@ class Eyes:
 
     def look(self, frames: Sequence[Frame], state: State) -> Look:
         """Find each ball in each image where a state expects it."""
+        self._go_along(state)
         whose = self._may_draw(frames)
         for index, album in enumerate(self._albums):
             album.draws_left = int(index == whose) if self._settled else None
@@ -106,6 +110,16 @@ class Eyes:
         smear_px = self._smear_px(state)
         look.blind = smear_px > BLIND_PX
         return look.doubted(SMEAR_DOUBT * smear_px) if look.blind else look
+
+    def _go_along(self, state: State) -> None:
+        """Take balls to look as they do where the vehicle is: lamps that hang near light it from other sides there."""
+        if self._middle_m is None:
+            return
+        place_m = state.p_BinW - self._middle_m
+        if math.dist(place_m, self._place_m) > PLACE_STEP_M:
+            self._place_m = place_m
+            self._rivals = [rivals.at(place_m) for rivals in self._rivals]
+            self._sum_up()
 
     def _look_again(self, frames: Sequence[Frame], state: State, look: Look) -> None:
         """Look at images without a ball in the light in which their camera last saw all; believe it if all are there.
@@ -153,6 +167,9 @@ class Eyes:
                 self._rivals = [first_rivals() for _ in self._rig.cameras]
                 self._sum_up()
         self._taught_blindly |= blindly and not self._gamma_known
+        if self._middle_m is None:
+            self._middle_m = state.p_BinW.copy()
+        place_m = state.p_BinW - self._middle_m
         if self._settled:
             if self._turn % self._every:
                 return
@@ -164,7 +181,7 @@ class Eyes:
             if overexposed(image, *expected.uv_px, expected.radius_px):
                 continue
             others = [rivals for other, rivals in enumerate(self._rivals) if other != index]
-            self._rivals[index] = self._rivals[index].learned(image, camera, expected, one.centre, others)
+            self._rivals[index] = self._rivals[index].learned(image, camera, expected, one.centre, others, place_m)
             if one.streak_px < SMEARED * expected.radius_px:
                 self._mounting.learn(image, expected, one.sighting.ball, one.centre, camera.R_CtoW.T @ state.R_BtoW)
         self._sum_up()

@@ -1,43 +1,127 @@
-"""The light that explains best what balls show: lamps all round, none of which takes light away.
+"""The light that explains best what balls show: lamps all round, far or near, none of which takes light away.
 
-One camera sees one side of a ball, and a slope of light across it looks much like a centre pulled aside. Two things
-tell them apart. Balls seen by all cameras are lit by the same room, from as many sides as there are cameras. And light
-is never negative, which one lamp, a row of windows and an even sky obey alike: nothing else is supposed of them.
+One camera sees one side of a ball, and a slope of light across it looks much like a centre pulled aside. Three things
+tell them apart. Balls seen by all cameras are lit by the same room, from as many sides as there are cameras. Light is
+never negative, which one lamp, a row of windows and an even sky obey alike. And a lamp that hangs near lights a
+vehicle that flies about from other sides, as its distance demands: nothing else is supposed of them.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
+
 import numpy as np
 from scipy.optimize import nnls
 
-from tracker.image.harmonics import LAMBERT, terms_at
+from tracker.image.harmonics import LAMBERT, TERMS, terms_at
 from tracker.maths.sphere import spread
 from tracker.types import Array
 
 DIRECTIONS = spread(96)
 """Where lamps may be (96, 3), 20 degrees apart: what lies between two is seen as both."""
+NEARNESS = (0.0, 0.3, 0.6)
+"""One by how far from the room's middle they may hang [1/m]."""
+MOVING = 9
+"""Terms that differ by place: those of degrees 0, 1 and 2, of the others too little reaches a ball."""
+ROOM_TERMS = TERMS + 3 * MOVING
+"""The light in the room's middle, and by how much its first terms grow along x, y and z of W [1/m]."""
+FARTHEST_M = 0.8  # from the middle: beyond, what was learned in between is not carried on
 EVEN = 8.0  # of each term before any ball: two lamps that share half of the light have a sigma of 0.35
+NEAR_MISFIT = 0.75  # of what far lamps leave unexplained, at most, for near ones to be believed
 ONE = 1e3  # how firmly the even light is held to 1, beside what is learned
 BEAM = 0.9  # lamps closer to the brightest than that, by the cosine, are one with it
-_LAMPS = terms_at(DIRECTIONS) / LAMBERT[:, None]  # of each lamp, the mean of its light over the ball 1
+_STEP_M = 0.4  # over which a near lamp's growth is taken: as far as a vehicle usually goes
+_DIMMEST = 0.25  # of the middle's light
 
 
-def explained(information: Array, target: Array) -> tuple[Array, Array]:
+def _lamps(nearness: float) -> Array:
+    """Return the terms of lamps in DIRECTIONS (ROOM_TERMS, 96), the mean of a lamp's light over a middle ball 1."""
+    grown = [np.zeros((MOVING, len(DIRECTIONS)))] * 3
+    if nearness:
+        axes = _STEP_M * np.eye(3)
+        grown = [(_light_at(nearness, axis) - _light_at(nearness, -axis)) / (2.0 * _STEP_M) for axis in axes]
+    return np.vstack((terms_at(DIRECTIONS) / LAMBERT[:, None], *grown))
+
+
+def _light_at(nearness: float, place_m: Array) -> Array:
+    """Return the first terms (MOVING, 96) of lamps at a place (3,) from the middle, by the square of the distance."""
+    away = DIRECTIONS - nearness * place_m
+    distance = np.linalg.norm(away, axis=1)
+    terms: Array = terms_at(away / distance[:, None])[:MOVING] / LAMBERT[:MOVING, None]
+    return np.asarray(terms / distance**2)
+
+
+_LAMPS = np.stack([_lamps(nearness) for nearness in NEARNESS])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RoomLight:
+    """The light about the room's middle.
+
+    terms: (ROOM_TERMS,), the even light in the middle 1.
+    lamp: (3,) unit vector from the middle to the brightest lamp, and its nearness [1/m].
+    """
+
+    terms: Array = field(default_factory=lambda: np.eye(ROOM_TERMS)[0])
+    lamp: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
+    nearness: float = 0.0
+
+    def terms_at(self, place_m: Array) -> Array:
+        """Return the terms (TERMS,) at a place (3,) from the middle in W [m]."""
+        terms = self.terms[:TERMS].copy()
+        terms[:MOVING] += within(place_m) @ self.terms[TERMS:].reshape(3, MOVING)
+        terms /= max(terms[0], _DIMMEST)
+        return terms
+
+    def lamp_at(self, place_m: Array) -> Array:
+        """Return the unit vector (3,) from there to the brightest lamp."""
+        towards = self.lamp - self.nearness * within(place_m)
+        unit: Array = towards / np.linalg.norm(towards)
+        return unit
+
+
+def within(place_m: Array) -> Array:
+    """Return a place (3,) from the middle, or the farthest one on the way there that light is told for [m]."""
+    away_m = float(np.linalg.norm(place_m))
+    return place_m if away_m <= FARTHEST_M else place_m * (FARTHEST_M / away_m)
+
+
+def explained(information: Array, target: Array) -> RoomLight:
     """Return the light that fits normal equations best among those that no lamp takes anything from.
 
+    Lamps are first taken to be far away; then those that shine may be near, if that explains clearly more: what is
+    free to hang anywhere follows chance.
+
     Args:
-        information (TERMS, TERMS), target (TERMS,): of the terms in W, their even light about 1.
-    Returns:
-        the terms (TERMS,), their even light 1; and the unit vector (3,) to the brightest lamp.
+        information (ROOM_TERMS, ROOM_TERMS), target (ROOM_TERMS,): of the terms, the even light about 1.
+    Raises:
+        RuntimeError: the search for lamps did not end.
     """
     held = information + EVEN * np.eye(len(information))
     aim = target.copy()
     aim[0] += EVEN
-    root = np.linalg.cholesky(held)
+    root = np.asarray(np.linalg.cholesky(held), np.float64)
+    goal = np.asarray(np.linalg.solve(root, aim), np.float64)
+    shares, far_misfit = _shares(root, goal, _LAMPS[0])
+    lamps, towards, nearness = _LAMPS[0], DIRECTIONS, np.zeros(len(DIRECTIONS))
+    shining = np.flatnonzero(shares)
+    near = np.concatenate(_LAMPS[:, :, shining], axis=1)
+    near_shares, misfit = _shares(root, goal, near)
+    if misfit < NEAR_MISFIT * far_misfit:
+        lamps, shares, nearness = near, near_shares, np.repeat(NEARNESS, len(shining))
+        towards = np.tile(DIRECTIONS[shining], (len(NEARNESS), 1))
+    beam = shares * (towards @ towards[np.argmax(shares)] > BEAM)
+    lamp = beam @ towards
+    return RoomLight(lamps @ shares, lamp / np.linalg.norm(lamp), float(beam @ nearness / beam.sum()))
+
+
+def _shares(root: Array, goal: Array, lamps: Array) -> tuple[Array, float]:
+    """Return how much light each of some lamps (ROOM_TERMS, n) throws, and the sum of squares that they leave.
+
+    Returns:
+        (n,) none negative, 1 together, and what they leave unexplained.
+    """
     weight = ONE * root[0, 0]
-    rows = np.vstack((root.T @ _LAMPS, np.full(_LAMPS.shape[1], weight)))
-    lamps, _ = nnls(rows, np.append(np.linalg.solve(root, aim), weight))
-    lamps /= lamps.sum()
-    near = lamps * (DIRECTIONS @ DIRECTIONS[np.argmax(lamps)] > BEAM)
-    towards = near @ DIRECTIONS
-    return _LAMPS @ lamps, towards / np.linalg.norm(towards)
+    rows = np.vstack((root.T @ lamps, np.full(lamps.shape[1], weight)))
+    shares, left = nnls(rows, np.append(goal, weight))
+    return np.asarray(shares / shares.sum()), float(left) ** 2

@@ -2,9 +2,9 @@
 
 All balls are matt, of one paint each, and far smaller than the room: the brightness of a ball at a point with normal
 n is its paint times one function of n, E(n), whatever lamps, windows and walls there are: a sum of a few harmonics
-(`tracker/image/harmonics.py`), with lamps behind them (`tracker/image/lamps.py`). It is learned from the balls' own
-images; afterwards a ball's image is known up to two factors, and the shaded limb no longer pulls its centre towards
-the lamp.
+(`tracker/image/harmonics.py`), with lamps behind them (`tracker/image/lamps.py`), and with those that hang near another
+one at another place. It is learned from the balls' own images; afterwards a ball's image is known up to two factors,
+and the shaded limb no longer pulls its centre towards the lamp.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tracker.image.harmonics import LAMBERT, TERMS, turned
-from tracker.image.lamps import explained
+from tracker.image.lamps import MOVING, ROOM_TERMS, RoomLight, explained, within
 from tracker.image.template import GLOSS, Shades, Vector
 from tracker.maths.compiled import compiled
 from tracker.maths.covariance import propagated
@@ -29,20 +29,25 @@ ENOUGH = 3  # balls until the light is trusted
 STEPS, LAMP_STEPS = 512, 32  # how finely 1 is divided where weights, and the lamp's direction, are rounded
 COVERAGE = (1.0,) + (0.0,) * TERMS
 MIRROR = (0.0,) * GLOSS + (1.0,)
+MIDDLE = np.zeros(3)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Light:
     """What is known of the light.
 
-    lamp: (3,) unit vector to the brightest lamp in W.  terms: (TERMS,) of E in W, the even light 1.
-    information (TERMS, TERMS), target (TERMS,): normal equations of what one camera's balls taught.  count: balls.
+    lamp: (3,) unit vector to the brightest lamp in W.  terms: (TERMS,) of E in W, the even light 1. Both are of one
+        place in the room.
+    room: the light at any place.
+    information (ROOM_TERMS, ROOM_TERMS), target (ROOM_TERMS,): normal equations of what one camera's balls taught.
+    count: balls.
     """
 
     lamp: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     terms: Array = field(default_factory=lambda: np.eye(TERMS)[0])
-    information: Array = field(default_factory=lambda: np.zeros((TERMS, TERMS)))
-    target: Array = field(default_factory=lambda: np.zeros(TERMS))
+    room: RoomLight = field(default_factory=RoomLight)
+    information: Array = field(default_factory=lambda: np.zeros((ROOM_TERMS, ROOM_TERMS)))
+    target: Array = field(default_factory=lambda: np.zeros(ROOM_TERMS))
     count: int = 0
 
     @property
@@ -50,31 +55,36 @@ class Light:
         """Say whether enough balls were learned."""
         return self.count >= ENOUGH
 
-    def learned(self, information: Array, target: Array, R_RtoW: Array) -> Light:
+    def at(self, place_m: Array) -> Light:
+        """Return it at a place (3,) from the room's middle in W [m]."""
+        return replace(self, lamp=self.room.lamp_at(place_m), terms=self.room.terms_at(place_m))
+
+    def learned(self, information: Array, target: Array, R_RtoW: Array, place_m: Array = MIDDLE) -> Light:
         """Return it with what one more ball teaches; the same when the ball has no brightness of its own.
 
         Args:
             information (TERMS, TERMS), target (TERMS,): normal equations of the terms in the ball's ray frame, times
                 the brightness of its paint.
             R_RtoW: (3, 3) turns the ray's frame into the room.
+            place_m: (3,) where the ball was, from the room's middle in W.
         """
         after, aim = self.information.copy(), self.target.copy()
         kept = min(FORGETTING, 1.0 - 1.0 / (self.count + 2.0))  # the first are learned before blur and light are known
-        if not _add(after, aim, information, target, R_RtoW, self.terms, kept):
+        if not _add(after, aim, information, target, R_RtoW, self.room.terms, within(place_m), kept):
             return self
-        return Light(self.lamp, self.terms, after, aim, self.count + 1)
+        return Light(self.lamp, self.terms, self.room, after, aim, self.count + 1)
 
-    def solved(self, others: Iterable[Light]) -> Light:
-        """Return it with the lamps that explain best what this camera's balls and those of others show."""
+    def solved(self, others: Iterable[Light], place_m: Array = MIDDLE) -> Light:
+        """Return it with the lamps that explain best what this camera's balls and those of others show, at a place."""
         information, target = self.information.copy(), self.target.copy()
         for other in others:
             information += other.information
             target += other.target
         try:
-            terms, lamp = explained(information, target)
+            room = explained(information, target)
         except RuntimeError:  # the search for lamps did not end: the light known before serves on
             return self
-        return replace(self, lamp=lamp, terms=terms)
+        return replace(self, room=room).at(place_m)
 
     def apart_from(self, other: Light) -> float:
         """Return by how much two lights differ, rms over all directions a ball's surface may face, their mean being 1.
@@ -103,29 +113,38 @@ def _rounded(values: Array, steps: int) -> list[float]:
     return [round(value * steps) / steps for value in values.tolist()]
 
 
-@compiled("b1(f8[:, ::1], f8[::1], f8[:, ::1], f8[::1], Array(f8, 2, 'C', True), f8[::1], f8)")
+@compiled("b1(f8[:, ::1], f8[::1], f8[:, ::1], f8[::1], Array(f8, 2, 'C', True), f8[::1], f8[::1], f8)")
 def _add(
-    information: Array, target: Array, seen: Array, seen_target: Array, R_RtoW: Array, terms: Array, kept: float
-) -> bool:
+    information: Array, target: Array, seen: Array, seen_target: Array, R_RtoW: Array, room: Array, place_m: Array,
+    kept: float,
+) -> bool:  # fmt: skip
     """Keep so much and add one ball's normal equations, turned into the room, in place; False if it has no brightness.
 
     How bright its paint is in this light is the ball's own, and is taken out: to give every ball the same mean would
     say that no side of the room is brighter, and what is left for the light to follow looks like a centre pulled aside.
-    Source: pixels are s T e with paint s and terms e, linearised about today's e and the s that fits it best.
+    Source: pixels are s T e with paint s and terms e, linearised about today's e and the s that fits it best; e goes
+        with the place, e = a + sum_k place_k b_k of the room's terms (a, b).
     """
-    turn = turned(R_RtoW)
+    turn, terms = turned(R_RtoW), room[:TERMS].copy()
+    for k in range(3):
+        for i in range(MOVING):
+            terms[i] += place_m[k] * room[TERMS + MOVING * k + i]
     more, aim, shown = propagated(turn, seen, np.zeros((TERMS, TERMS))), np.zeros(TERMS), np.zeros(TERMS)
     for i in range(TERMS):
         aim[i], shown[i] = dot(turn[i], seen_target), dot(more[i], terms)
     squares, common = dot(terms, shown), dot(terms, aim)
     if not (squares > 0.0 and common > 0.0):
         return False
-    paint = common / squares
-    for i in range(TERMS):
-        target[i] = kept * target[i] + paint * (aim[i] - paint * shown[i])
-        for j in range(TERMS):
-            apart = paint * paint * (more[i, j] - shown[i] * shown[j] / squares)
-            information[i, j] = kept * information[i, j] + apart
+    paint, n = common / squares, TERMS + 3 * MOVING
+    term, by = np.empty(n, np.int64), np.empty(n)
+    for i in range(n):
+        k, of = (i - TERMS) // MOVING, (i - TERMS) % MOVING
+        term[i], by[i] = (i, 1.0) if i < TERMS else (of, place_m[k])
+    for i in range(n):
+        target[i] = kept * target[i] + by[i] * paint * (aim[term[i]] - paint * shown[term[i]])
+        for j in range(n):
+            apart = more[term[i], term[j]] - shown[term[i]] * shown[term[j]] / squares
+            information[i, j] = kept * information[i, j] + by[i] * by[j] * paint * paint * apart
     return True
 
 

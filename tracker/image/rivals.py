@@ -11,14 +11,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from tracker.camera import Camera
 from tracker.image.appearance import MISFIT_MAX, Appearance
 from tracker.image.centre import Centre, fit_centre
-from tracker.image.light import Light
+from tracker.image.light import MIDDLE, Light
 from tracker.image.patch import Expected, Response, behind_is_known
 from tracker.types import Array, Image
 
@@ -78,18 +78,31 @@ class Rivals:
         """Return the appearance of the gamma nearest to that."""
         return min(self.appearances, key=lambda one: abs(one.response.gamma - gamma))
 
+    def at(self, place_m: Array) -> Rivals:
+        """Return them at a place (3,) from the room's middle in W [m]; the same where the light is hardly another."""
+        appearances = tuple([one.at(place_m) for one in self.appearances])
+        same = all(after is before for after, before in zip(appearances, self.appearances, strict=True))
+        return self if same else replace(self, appearances=appearances)
+
     def learned(
-        self, image: Image, camera: Camera, ball: Expected, found: Centre, others: Sequence[Rivals] = ()
+        self,
+        image: Image,
+        camera: Camera,
+        ball: Expected,
+        found: Centre,
+        others: Sequence[Rivals] = (),
+        place_m: Array = MIDDLE,
     ) -> Rivals:
         """Return the rivals after one more ball; arguments as for `Appearance.learned`, others of other cameras."""
         if found.misfit > MISFIT_MAX:
             return self
         if self.settled and not self.by_room and behind_is_known(ball):
-            return _around(self.best, APART, self.pull_px, by_room=True).learned(image, camera, ball, found, others)
+            around = _around(self.best, APART, self.pull_px, by_room=True)
+            return around.learned(image, camera, ball, found, others, place_m)
         if self.settled:
             if ball.response.gamma != self.best.response.gamma:
                 return self  # looked at before this gamma was found
-            one = self.best.learned(image, camera, ball, found, _lights(others, self.best))
+            one = self.best.learned(image, camera, ball, found, _lights(others, self.best), place_m)
             return Rivals((one,), self.misfits, self.count + 1, self.pull_px, self.by_room, self.doubt)
         if self.by_room and not behind_is_known(ball):
             return self
@@ -100,7 +113,7 @@ class Rivals:
             fit = fit_centre(image, own)
             if not isinstance(fit, Centre):
                 return self
-            appearances.append(rival.learned(image, camera, own, fit, _lights(others, rival)))
+            appearances.append(rival.learned(image, camera, own, fit, _lights(others, rival), place_m))
             centres.append(fit.uv_px)
             misfits.append(misfit + share * (float(np.log(fit.misfit)) - misfit))
         apart = appearances[-1].response.gamma - appearances[0].response.gamma

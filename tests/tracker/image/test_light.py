@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tracker.image.harmonics import LAMBERT, TERMS, terms_at
-from tracker.image.lamps import explained
+from tracker.image.lamps import ROOM_TERMS, explained
 from tracker.image.light import Light
 from tracker.maths.sphere import spread
 from tracker.types import Array
@@ -77,8 +77,49 @@ def test_a_ball_without_brightness_of_its_own_teaches_nothing() -> None:
 @given(st.integers(0, 2**32 - 1))
 def test_no_light_is_negative(seed: int) -> None:
     drawn = np.random.default_rng(seed)
-    root, target = drawn.normal(size=(TERMS, TERMS)), drawn.normal(size=TERMS) * 10.0 ** drawn.uniform(-2.0, 4.0)
-    terms, lamp = explained(root @ root.T * 10.0 ** drawn.uniform(-2.0, 6.0), target)
+    size = (ROOM_TERMS, ROOM_TERMS)
+    root, target = drawn.normal(size=size), drawn.normal(size=ROOM_TERMS) * 10.0 ** drawn.uniform(-2.0, 4.0)
+    room = explained(root @ root.T * 10.0 ** drawn.uniform(-2.0, 6.0), target)
+    terms = room.terms[:TERMS]
     assert (terms @ terms_at(NORMALS)).min() > SHADOW
     assert terms[0] == pytest.approx(1.0)
-    assert np.linalg.norm(lamp) == pytest.approx(1.0)
+    assert np.linalg.norm(room.lamp) == pytest.approx(1.0)
+
+
+NEAR_M = np.array([0.9, -0.7, 1.4])  # where a lamp hangs
+PLACES = np.array([[x, y, z] for x in (-0.4, 0.0, 0.4) for y in (-0.4, 0.4) for z in (-0.3, 0.3)])
+ELSEWHERE = np.array([0.3, -0.3, 0.1])
+
+
+def lamps_from(place_m: Array, *, near: bool) -> Lamps:
+    """Return how a ball at a place from the middle is lit: half by even light in the middle, half by a lamp."""
+    away = NEAR_M - place_m if near else NEAR_M
+    distance, at_the_middle = np.linalg.norm(away), np.linalg.norm(NEAR_M)
+    strength = float((at_the_middle / distance) ** 2)
+    return ((away / distance, strength / (1.0 + strength)),)
+
+
+def learned_about(*, near: bool) -> Light:
+    """Return the light that two cameras learn of balls that go about."""
+    lights = []
+    for side in SIDES:
+        light = Light()
+        for seed, place_m in enumerate(PLACES):
+            seen = equations(lamps_from(place_m, near=near), side, 1.0 + seed / 10.0, seed)
+            light = light.learned(*seen, NO_TURN, place_m).solved([])
+        lights.append(light)
+    return lights[0].solved(lights[1:])
+
+
+def test_a_lamp_that_hangs_near_lights_each_place_from_its_own_side() -> None:
+    light = learned_about(near=True)
+    there, true = light.at(ELSEWHERE), lamps_from(ELSEWHERE, near=True)
+    assert misjudged(there, true) < 0.12  # of up to 3
+    assert misjudged(light.at(np.zeros(3)), true) > 2.0 * misjudged(there, true)
+    assert float(there.lamp @ true[0][0]) > np.cos(np.radians(20.0))
+
+
+def test_a_lamp_that_is_far_away_lights_all_places_alike() -> None:
+    light = learned_about(near=False)
+    assert light.at(ELSEWHERE).apart_from(light.at(np.zeros(3))) < 0.01
+    assert misjudged(light.at(ELSEWHERE), lamps_from(ELSEWHERE, near=False)) < 0.06
