@@ -63,6 +63,7 @@ class Eyes:
         for index, appearance in enumerate(appearances):
             if self._gazes[index].appearance is not appearance:
                 self._gazes[index] = self._gazes[index].at_such(appearance)
+        self._by_place = any(appearance.light.room.differs for appearance in appearances)
         self._exposures_s = tuple([appearance.response.exposure_s for appearance in appearances])
         self.exposure_s = max(self._exposures_s)
         self.lessons_due = max(rivals.lessons_due for rivals in self._rivals)
@@ -113,7 +114,7 @@ class Eyes:
 
     def _go_along(self, state: State) -> None:
         """Take balls to look as they do where the vehicle is: lamps that hang near light it from other sides there."""
-        if self._middle_m is None:
+        if self._middle_m is None or not self._by_place:
             return
         place_m = state.p_BinW - self._middle_m
         if math.dist(place_m, self._place_m) > PLACE_STEP_M:

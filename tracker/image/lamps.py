@@ -60,11 +60,13 @@ class RoomLight:
 
     terms: (ROOM_TERMS,), the even light in the middle 1.
     lamp: (3,) unit vector from the middle to the brightest lamp, and its nearness [1/m].
+    differs: whether it is another one at another place.
     """
 
     terms: Array = field(default_factory=lambda: np.eye(ROOM_TERMS)[0])
     lamp: Array = field(default_factory=lambda: np.array([0.0, 0.0, 1.0]))
     nearness: float = 0.0
+    differs: bool = False
 
     def terms_at(self, place_m: Array) -> Array:
         """Return the terms (TERMS,) at a place (3,) from the middle in W [m]."""
@@ -102,17 +104,20 @@ def explained(information: Array, target: Array) -> RoomLight:
     aim[0] += EVEN
     root = np.asarray(np.linalg.cholesky(held), np.float64)
     goal = np.asarray(np.linalg.solve(root, aim), np.float64)
-    shares, far_misfit = _shares(root, goal, _LAMPS[0])
+    some = slice(0, TERMS)  # far lamps are alike everywhere: the root, a triangle, leaves nothing of them further down
+    shares, far_misfit = _shares(root[some, some], goal[some], _LAMPS[0, some])
+    far_misfit += float(goal[TERMS:] @ goal[TERMS:])
     lamps, towards, nearness = _LAMPS[0], DIRECTIONS, np.zeros(len(DIRECTIONS))
     shining = np.flatnonzero(shares)
     near = np.concatenate(_LAMPS[:, :, shining], axis=1)
     near_shares, misfit = _shares(root, goal, near)
-    if misfit < NEAR_MISFIT * far_misfit:
+    differs = misfit < NEAR_MISFIT * far_misfit
+    if differs:
         lamps, shares, nearness = near, near_shares, np.repeat(NEARNESS, len(shining))
         towards = np.tile(DIRECTIONS[shining], (len(NEARNESS), 1))
     beam = shares * (towards @ towards[np.argmax(shares)] > BEAM)
     lamp = beam @ towards
-    return RoomLight(lamps @ shares, lamp / np.linalg.norm(lamp), float(beam @ nearness / beam.sum()))
+    return RoomLight(lamps @ shares, lamp / np.linalg.norm(lamp), float(beam @ nearness / beam.sum()), differs)
 
 
 def _shares(root: Array, goal: Array, lamps: Array) -> tuple[Array, float]:
