@@ -51,6 +51,10 @@ class Appearance:
             return self
         return replace(self, response=replace(self.response, gamma=gamma), light=self.light.faded())
 
+    def in_other_light(self) -> Appearance:
+        """Return it with the light to be learned from nothing."""
+        return Appearance(self.response)
+
     def expected_like(self, ball: Expected, camera: Camera, uv_px: Array) -> Expected:
         """Return what would be expected of a ball, seen at uv_px (2,), if it looked as is known here."""
         place = float(uv_px[0]), float(uv_px[1])

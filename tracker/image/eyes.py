@@ -15,6 +15,7 @@ from tracker.image.look import Look, gaze_of, look_near
 from tracker.image.mounting import Mounting
 from tracker.image.rivals import first_rivals
 from tracker.image.sight import MISFIT
+from tracker.image.surprise import Surprise
 from tracker.image.tint import NEUTRAL, Gains, Tint, core_colour
 from tracker.image.view import RADIUS, unknown_streak_px, whereabouts
 from tracker.rig import Rig
@@ -47,6 +48,7 @@ class Eyes:
         self._tints = [Tint() for _ in rig.cameras]
         self._proven = [NEUTRAL for _ in rig.cameras]  # the light in which all balls were seen last
         self._mounting = Mounting(rig.marker)
+        self._surprise = Surprise(len(rig.cameras))
         self._gazes = [
             gaze_of(rig, Appearance(), album, room=behind.room)
             for album, behind in zip(self._albums, self._behind, strict=True)
@@ -69,7 +71,7 @@ class Eyes:
         self.lessons_due = max(rivals.lessons_due for rivals in self._rivals)
         self.doubts_px = np.array([rivals.doubt_px for rivals in self._rivals])
         self._gamma_known = all(rivals.settled or rivals.by_room for rivals in self._rivals)  # if not for the last time
-        enough = all(rivals.count >= LEARN_ALL or rivals.by_room for rivals in self._rivals)
+        enough = all(rivals.count >= LEARN_ALL or rivals.has_seen(LEARN_ALL) for rivals in self._rivals)
         self._settled = self._gamma_known and enough  # how balls look is known, so that little is left to learn
         self._every = LEARN_EVERY if all(rivals.settled for rivals in self._rivals) else 1
 
@@ -162,6 +164,8 @@ class Eyes:
         """
         self._turn += 1
         self._follow_the_light(look, seen)
+        if self._settled:
+            self._notice_other_light(look, seen)
         if self._taught_blindly and not blindly:
             self._taught_blindly = False
             if any(look.fitted(one).streak_px > LONG_STREAK_PX for one in seen):
@@ -186,6 +190,16 @@ class Eyes:
             if one.streak_px < SMEARED * expected.radius_px:
                 self._mounting.learn(image, expected, one.sighting.ball, one.centre, camera.R_CtoW.T @ state.R_BtoW)
         self._sum_up()
+
+    def _notice_other_light(self, look: Look, seen: Sequence[BallSighting]) -> None:
+        """Begin the light anew once all balls fit so much worse than before that it must fall otherwise now."""
+        for camera, glance in look.glances.items():
+            misfit_of = glance.fits.item
+            self._surprise.take(camera, [misfit_of(one.ball, MISFIT) for one in seen if one.camera == camera])
+        if self._surprise.is_great:
+            self._rivals = [rivals.in_other_light() for rivals in self._rivals]
+            self._surprise = Surprise(len(self._rivals))
+            self._sum_up()
 
     def look_behind(self, frames: Sequence[Frame], state: State) -> None:
         """Learn the room where the vehicle is not, by frames of about a state's time; once it is known, by some."""

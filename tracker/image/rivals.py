@@ -74,6 +74,10 @@ class Rivals:
         """Say whether the search is over."""
         return len(self.appearances) == 1
 
+    def has_seen(self, balls: int) -> bool:
+        """Say whether the search goes by the room, and the light was learned from so many balls before or since."""
+        return self.by_room and self.best.light.count >= balls
+
     def under(self, gamma: float) -> Appearance:
         """Return the appearance of the gamma nearest to that."""
         return min(self.appearances, key=lambda one: abs(one.response.gamma - gamma))
@@ -120,6 +124,11 @@ class Rivals:
         pull_px = self.pull_px + share * ((centres[-1] - centres[0]) / apart - self.pull_px)
         after = Rivals(tuple(appearances), tuple(misfits), self.count + 1, pull_px, self.by_room)
         return after._judged() if after._due() else after
+
+    def in_other_light(self) -> Rivals:
+        """Return them with the light to be learned from nothing; what is known of the camera stays."""
+        appearances = tuple(appearance.in_other_light() for appearance in self.appearances)
+        return Rivals(appearances, (0.0,) * len(appearances), 0, self.pull_px, self.by_room, self.doubt)
 
     def _due(self) -> bool:
         """Say whether to judge them: they differ clearly, or will hardly ever."""

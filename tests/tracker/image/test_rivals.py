@@ -132,3 +132,16 @@ def test_where_the_lowest_rival_is_the_best_lower_ones_are_tried() -> None:
     again = one_ball_more(settled_at(1.9), KNOWN_ROOM)
     due = replace(again, misfits=(0.0, 1.0, 2.0), count=ROUND_BALLS - 1)
     assert gammas(one_ball_more(due, KNOWN_ROOM)) == pytest.approx([1.0, 1.3, 1.6])
+
+
+def test_in_other_light_a_camera_stays_known_and_the_light_is_learned_from_nothing() -> None:
+    known = Appearance(Response(gamma=1.7, luma_px=0.6), Light(count=200), Light(count=198))
+    before = Rivals((known,), (0.0,), 200, np.array([0.1, 0.2]), by_room=True, doubt=0.1)
+    anew = before.in_other_light()
+    assert anew.settled
+    assert anew.best.response == known.response
+    assert (anew.best.light.count, anew.best.shown.count) == (0, 0)
+    assert anew.lessons_due == FIRST_LESSONS
+    assert before.has_seen(200)
+    assert not anew.has_seen(1)
+    assert anew.doubt_px > before.doubt_px
