@@ -24,7 +24,7 @@ from tracker.types import Array, BallSighting, Frame
 
 LIGHT_BALLS = 2  # a single ball that is something else would tell of a light that is not there
 LEARN_ALL = 108  # balls of each camera under its gamma; then
-LEARN_EVERY = 5  # rounds one ball: odd, for free-running cameras have rounds in turn
+LEARN_EVERY = 11  # rounds one ball: odd, for free-running cameras have rounds in turn
 BLIND_PX = 0.5  # of the streak's sigma: how fast the balls move is not known
 SMEAR_DOUBT = 0.1  # of an unknown smear: what it moves the centre of a shaded ball, one sigma
 SMEARED = 0.5  # radii: a ball smeared further leaves something at the ends of its streak
