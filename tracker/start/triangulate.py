@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from tracker.maths.compiled import compiled
 from tracker.types import Array, Point, Reason, Rejected, frozen_array
@@ -37,19 +40,29 @@ def triangulate(u_inW: Array, p_CinW: Array, sigma_bearing: float) -> Point | Re
     return Point(frozen_array(place), frozen_array(covariance), miss_m)
 
 
-def meetings(a_inW: Array, b_inW: Array, p_CinW: Array, sigma_bearing: float, slack_m: float) -> list[Point]:
+class Rays(NamedTuple):
+    """What one camera sees: unit bearings u_inW (n, 3), and within_m (n, 2), how near and far along each it is [m]."""
+
+    u_inW: Array
+    within_m: Array
+
+
+def meetings(a: Rays, b: Rays, p_CinW: Array, sigma_bearing: float, slack_m: float) -> list[Point]:
     """Find where rays of one camera meet rays of another: the epipolar constraint, in metres.
 
     Args:
-        a_inW, b_inW: (n, 3) and (m, 3) unit bearings from one camera and from the other.
+        a, b: of one camera and of the other.
         p_CinW: (2, 3) the cameras' centres [m].  sigma_bearing: as `triangulate` takes it.
         slack_m: what rays may miss each other by beyond what their own uncertainty allows [m].
     Returns:
-        Those of their points that `triangulate` does not reject, and where they miss each other by no more than that.
+        Those of their points that `triangulate` does not reject, where they miss each other by no more than that and
+        where both may be.
     """
-    count = len(a_inW) * len(b_inW)
+    pairs = np.empty((len(a.u_inW) * len(b.u_inW), 2), np.int64)
+    pairs = pairs[: _may_meet(*a, *b, p_CinW, sigma_bearing, slack_m, pairs)]
+    count = len(pairs)
     met, places, covariances = np.empty((count, 4)), np.empty((count, 3)), np.empty((count, 3, 3))
-    _met(a_inW, b_inW, p_CinW, sigma_bearing, met, places, covariances)
+    _met(a.u_inW, b.u_inW, pairs, p_CinW, sigma_bearing, met, places, covariances)
     return [
         Point(frozen_array(place), frozen_array(covariance), miss_m)
         for (cosine, least_reach_m, miss_m, sigma_m), place, covariance in zip(
@@ -90,15 +103,52 @@ def _nearest(u: Array, c: Array, sigma: float, found: Array, p: Array, covarianc
     covariance[:] = inverse @ spread @ inverse  # (2)
 
 
-@compiled("void(Array(f8, 2, 'C', True), Array(f8, 2, 'C', True), Array(f8, 2, 'C', True), f8, f8[:, ::1], f8[:, ::1],"
-          " f8[:, :, ::1])")  # fmt: skip
-def _met(a: Array, b: Array, c: Array, sigma: float, met: Array, places: Array, covariances: Array) -> None:
-    """Fill in what `_nearest` does for each ray of a with each of b; met (n, 4) has one sigma of the place besides."""
-    pair, k = np.empty((2, 3)), 0
+@compiled(
+    "i8(Array(f8, 2, 'C', True), Array(f8, 2, 'C', True), Array(f8, 2, 'C', True), Array(f8, 2, 'C', True),"
+    "Array(f8, 2, 'C', True), f8, f8, i8[:, ::1])"
+)
+def _may_meet(
+    a: Array, a_within: Array, b: Array, b_within: Array, c: Array, sigma: float, slack: float, pairs: NDArray[np.int64]
+) -> int:
+    """Fill in the pairs (n, 2) of rays that come near each other where both may be, and return how many those are.
+
+    Quick, since a room may hold hundreds of things of a ball's colour; nothing is left out that `_nearest` would keep.
+    Source: the feet of the common perpendicular of two lines. Rays at an angle t cross within s |p - c| / sqrt(1 - cos
+        t), one sigma, of where they seem to, in any direction.
+    """
+    w, count = c[0] - c[1], 0
     for i in range(len(a)):
+        d = a[i, 0] * w[0] + a[i, 1] * w[1] + a[i, 2] * w[2]
         for j in range(len(b)):
-            pair[0], pair[1] = a[i], b[j]
-            covariances[k] = 0.0
-            _nearest(pair, c, sigma, met[k, :3], places[k], covariances[k])
-            met[k, 3] = np.sqrt(np.trace(covariances[k]) / 3.0)
-            k += 1
+            cosine = a[i, 0] * b[j, 0] + a[i, 1] * b[j, 1] + a[i, 2] * b[j, 2]
+            if abs(cosine) > PARALLEL_COSINE:
+                continue
+            e = b[j, 0] * w[0] + b[j, 1] * w[1] + b[j, 2] * w[2]
+            along_a = (cosine * e - d) / (1.0 - cosine * cosine)
+            along_b = e + cosine * along_a
+            if not (a_within[i, 0] <= along_a <= a_within[i, 1] and b_within[j, 0] <= along_b <= b_within[j, 1]):
+                continue
+            squares = 0.0
+            for k in range(3):
+                squares += (w[k] + along_a * a[i, k] - along_b * b[j, k]) ** 2
+            sigma_m = sigma * max(along_a, along_b) / np.sqrt(1.0 - abs(cosine))
+            if np.sqrt(squares) / 2.0 <= slack + MISS_SIGMA * sigma_m:
+                pairs[count, 0], pairs[count, 1] = i, j
+                count += 1
+    return count
+
+
+@compiled(
+    "void(Array(f8, 2, 'C', True), Array(f8, 2, 'C', True), i8[:, ::1], Array(f8, 2, 'C', True), f8, f8[:, ::1],"
+    "f8[:, ::1], f8[:, :, ::1])"
+)
+def _met(
+    a: Array, b: Array, pairs: NDArray[np.int64], c: Array, sigma: float, met: Array, places: Array, covariances: Array
+) -> None:
+    """Fill in what `_nearest` does for pairs (n, 2), a ray of each; met (n, 4) has one sigma of the place besides."""
+    pair = np.empty((2, 3))
+    for k in range(len(pairs)):
+        pair[0], pair[1] = a[pairs[k, 0]], b[pairs[k, 1]]
+        covariances[k] = 0.0
+        _nearest(pair, c, sigma, met[k, :3], places[k], covariances[k])
+        met[k, 3] = np.sqrt(np.trace(covariances[k]) / 3.0)

@@ -9,6 +9,7 @@ import pytest
 
 from tests.tracker.rigs import PROCESS, SECOND_NS, at, difference, ring_rig, seen_px, state
 from tracker.image.detect import Blob
+from tracker.maths import so3
 from tracker.rig import Rig
 from tracker.start.acquire import Seen, first_state
 from tracker.state import State
@@ -56,6 +57,65 @@ def test_it_is_found_among_decoys_of_its_colours_from_rough_centroids(seed: int)
     error = difference(TRUTH, found)
     assert np.abs(error[:3]).max() < 0.005
     assert np.abs(error[3:6]).max() < 0.1
+
+
+def in_a_room_of_orange(truth: State, rig: Rig, times_ns: dict[int, int], count: int, seed: int) -> Seen:
+    """Return what is seen where many things have one ball's colour, most of them larger than the ball."""
+    rng, whole = np.random.default_rng(seed), dict(seen(truth, rig, times_ns, 0.5, 0, seed))
+    for camera, (frame, blobs) in whole.items():
+        places, areas = rng.uniform((0, 0), (640, 480), size=(count, 2)), rng.uniform(5.0, 400.0, size=count)
+        things = [Blob(frozen_array(uv_px), float(area)) for uv_px, area in zip(places, areas, strict=True)]
+        every = sorted((*blobs[2], *things), key=lambda blob: -blob.area_px)
+        whole[camera] = (frame, [blobs[0], blobs[1], every])
+    return whole
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_it_is_found_where_a_hundred_larger_things_have_a_balls_colour(seed: int) -> None:
+    """Wood, boxes and bricks are orange: the largest spots of a colour need not hold the ball's."""
+    rig = ring_rig(2)
+    whole = in_a_room_of_orange(TRUTH, rig, {0: SECOND_NS, 1: SECOND_NS}, 100, seed)
+    error = difference(TRUTH, started(first_state(whole, rig, PROCESS)))
+    assert np.abs(error[:3]).max() < 0.005
+    assert np.abs(error[3:6]).max() < 0.1
+
+
+def test_a_thing_that_looks_too_large_for_a_ball_where_it_is_is_none() -> None:
+    """The same spots of the balls' colours, 25 times as large, would be balls five times nearer."""
+    rig = ring_rig(2)
+    whole = {
+        camera: (frame, [[Blob(blob.uv_px, 25.0 * blob.area_px) for blob in each] for each in blobs])
+        for camera, (frame, blobs) in seen(TRUTH, rig, {0: SECOND_NS, 1: SECOND_NS}).items()
+    }
+    found = first_state(whole, rig, PROCESS)
+    assert isinstance(found, Rejected)
+    assert found.reason is Reason.NOT_FOUND
+
+
+def test_one_trigger_tells_the_marker_from_what_only_motion_would_explain() -> None:
+    """A false orange ball, turned by 60 deg about the other two, has the marker's sides; its rays miss by 30 mm."""
+    rig = ring_rig(2)
+    whole = dict(seen(TRUTH, rig, {0: SECOND_NS, 1: SECOND_NS}, 0.5))
+    p1, p2, p3 = rig.marker.points_inB
+    turn = so3.exp(np.pi / 3.0 * (p2 - p1) / np.linalg.norm(p2 - p1))
+    false = TRUTH.p_BinW + TRUTH.R_BtoW @ (p1 + turn @ (p3 - p1))
+    across = np.cross(rig.cameras[1].p_CinW - rig.cameras[0].p_CinW, false - rig.cameras[0].p_CinW)
+    across *= 0.015 / np.linalg.norm(across)
+    for (camera, (frame, blobs)), shift_m in zip(whole.items(), (across, -across), strict=True):
+        spot = Blob(frozen_array(rig.cameras[camera].project((false + shift_m)[None])[0][0]), 25.0)
+        whole[camera] = (frame, [blobs[0], blobs[1], [spot, *blobs[2]]])
+    assert np.abs(difference(TRUTH, started(first_state(whole, rig, PROCESS)))[3:6]).max() < 0.1
+
+
+def test_a_spot_grown_together_with_another_still_starts_a_track() -> None:
+    """Its middle is 6 px off in one camera: 16 mm, more than one trigger explains."""
+    rig = ring_rig(2)
+    whole = dict(seen(TRUTH, rig, {0: SECOND_NS, 1: SECOND_NS}))
+    frame, blobs = whole[1]
+    grown = Blob(frozen_array(blobs[2][0].uv_px + np.array([6.0, 0.0])), 60.0)
+    whole[1] = (frame, [blobs[0], blobs[1], [grown]])
+    error = difference(TRUTH, started(first_state(whole, rig, PROCESS)))
+    assert np.abs(error[:3]).max() < 0.02
 
 
 def test_its_covariance_covers_what_the_first_look_may_err_by() -> None:

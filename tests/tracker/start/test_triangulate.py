@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.tracker.rigs import ring_rig
-from tracker.start.triangulate import MISS_SIGMA, meetings, triangulate
+from tracker.start.triangulate import MISS_SIGMA, Rays, meetings, triangulate
 from tracker.types import Array, Point, Reason, Rejected
 
 SIGMA_RAD = 5e-4
@@ -109,6 +109,19 @@ def test_two_cameras_in_one_place_are_rejected() -> None:
     assert point.reason is Reason.PARALLAX
 
 
+def anywhere(u_inW: Array) -> Rays:
+    return Rays(u_inW, np.tile((0.0, np.inf), (len(u_inW), 1)))
+
+
+@pytest.mark.parametrize(("camera", "share", "found"), [(0, 0.9, False), (1, 0.9, False), (0, 1.1, True)])
+def test_rays_meet_only_where_both_may_be(camera: int, share: float, found: bool) -> None:
+    """One camera's thing is said to be no further off than a share of its distance."""
+    p, p_CinW = np.array([0.1, -0.2, 0.3]), centres(2)
+    a, b = (anywhere(u[None]) for u in directions(p, p_CinW))
+    (a, b)[camera].within_m[0, 1] = share * np.linalg.norm(p - p_CinW[camera])
+    assert len(meetings(a, b, p_CinW, SIGMA_RAD, 0.0)) == found
+
+
 def test_rays_of_two_cameras_meet_where_each_pair_of_them_is_triangulated() -> None:
     """Each ray leads to a point of its own; the ray to the last one points the other way."""
     rng, p_CinW = np.random.default_rng(3), centres(2)
@@ -117,7 +130,7 @@ def test_rays_of_two_cameras_meet_where_each_pair_of_them_is_triangulated() -> N
     pairs = [triangulate(np.stack((u, v)), p_CinW, SIGMA_RAD) for u in a for v in b]
     points = [point for point in pairs if isinstance(point, Point)]
     near = [p for p in points if p.miss_m <= 0.1 + MISS_SIGMA * np.sqrt(np.trace(p.covariance) / 3.0)]
-    met = meetings(a, b, p_CinW, SIGMA_RAD, 0.1)
+    met = meetings(anywhere(a), anywhere(b), p_CinW, SIGMA_RAD, 0.1)
     assert 0 < len(met) == len(near) < len(points) < len(pairs)
     for one, other in zip(met, near, strict=True):
         assert np.array_equal(one.p_inW, other.p_inW)
