@@ -17,8 +17,9 @@ import numpy as np
 
 from tracker.image.at_centre import squares_at
 from tracker.image.evidence import LEAST_EVIDENCE
+from tracker.image.hidden import AT_ONCE, WHOLE, hidden_variance
 from tracker.image.holder import without_holders
-from tracker.image.newton import FIT_SIZE, gauss_newton
+from tracker.image.newton import EVIDENCE, FIT_SIZE, SHARES, gauss_newton
 from tracker.image.patch import Expected, Patch, cut, extent_of, fits_in
 from tracker.image.reading import LUMA_VAR
 from tracker.image.template import Template, template_for, variance_of
@@ -71,12 +72,14 @@ def fit_centre(image: Image, ball: Expected) -> Centre | Reason:
         return Reason.AT_BORDER
     patch, fit = without_holders(cut(image, extent, ball), extent, ball), np.empty(FIT_SIZE)
     luma, chroma = templates_of(ball)
-    gauss_newton(patch.bright, patch.colour, *luma, *chroma, numbers_of(ball), extent.du, extent.dv, fit)
-    du, dv, cov_uu, cov_uv, cov_vv, misfit, evidence = fit.tolist()
+    numbers = numbers_of(ball)
+    gauss_newton(patch.bright, patch.colour, *luma, *chroma, numbers, extent.du, extent.dv, fit)
+    du, dv, cov_uu, cov_uv, cov_vv, misfit, evidence = fit[: EVIDENCE + 1].tolist()
     if not (math.hypot(du - extent.du, dv - extent.dv) <= MAX_SHIFT_PX and evidence >= LEAST_EVIDENCE):
         return Reason.NO_BALL
     uv_px = frozen_array((extent.u + du, extent.v + dv))
-    return Centre(uv_px, frozen_array(((cov_uu, cov_uv), (cov_uv, cov_vv))), misfit)
+    hidden = hidden_variance(fit[SHARES:], AT_ONCE, WHOLE, numbers)
+    return Centre(uv_px, frozen_array(((cov_uu + hidden, cov_uv), (cov_uv, cov_vv + hidden))), misfit)
 
 
 def misfit_at(patch: Patch, ball: Expected, centre: tuple[float, float]) -> float:

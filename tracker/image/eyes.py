@@ -11,10 +11,11 @@ from tracker.image.album import Album
 from tracker.image.appearance import MISFIT_MAX, Appearance
 from tracker.image.behind import Behind
 from tracker.image.exposure import overexposed
+from tracker.image.hidden import remember
 from tracker.image.look import Look, gaze_of, look_near
 from tracker.image.mounting import Mounting
 from tracker.image.rivals import first_rivals
-from tracker.image.sight import MISFIT
+from tracker.image.sight import MISFIT, SHOWN
 from tracker.image.surprise import Surprise
 from tracker.image.tint import NEUTRAL, Gains, Tint, core_colour
 from tracker.image.view import RADIUS, unknown_streak_px, whereabouts
@@ -100,7 +101,7 @@ class Eyes:
         """Take the light in one camera to be so; the colours looked for change in few, large steps."""
         self._tints[index], gaze = tint, self._gazes[index]
         if tint.gains.undoing != gaze.undoing:
-            self._gazes[index] = gaze_of(self._rig, gaze.appearance, gaze.album, tint.gains, gaze.room)
+            self._gazes[index] = gaze.in_light(self._rig, tint.gains)
 
     def look(self, frames: Sequence[Frame], state: State) -> Look:
         """Find each ball in each image where a state expects it."""
@@ -137,8 +138,8 @@ class Eyes:
                 self._proven[index] = self._tints[index].gains
             elif count == 0 and self._proven[index].undoing != self._gazes[index].undoing:
                 gaze, gains = self._gazes[index], self._proven[index]
-                lit = gaze_of(self._rig, gaze.appearance, gaze.album, gains, gaze.room)
-                again = look_near([frame], self._rig, state, {index: lit}, self._mounting.things)
+                lit = {index: gaze.in_light(self._rig, gains)}
+                again = look_near([frame], self._rig, state, lit, self._mounting.things)
                 if len(again.sightings) == len(self._rig.marker):
                     self._light_up(index, self._tints[index]._replace(gains=gains))
                     look.replace(again)
@@ -163,6 +164,8 @@ class Eyes:
         blindly: how fast they moved was not known. It is better than nothing, and forgotten if they did move.
         """
         self._turn += 1
+        for index, glance in look.glances.items():
+            remember(glance.fits[:, SHOWN], self._gazes[index].lately)
         self._follow_the_light(look, seen)
         if self._settled:
             self._notice_other_light(look, seen)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -17,9 +17,10 @@ from tracker.image.behind import NO_ROOM, Room
 from tracker.image.centre import Centre
 from tracker.image.colour_table import ColourTable, colours_of_each
 from tracker.image.detect import Blob, find_blobs
+from tracker.image.hidden import never_seen
 from tracker.image.mounting import things_seen
 from tracker.image.patch import Expected
-from tracker.image.sight import COV, MISFIT, SIZE, SPOT, UV, Known, find_ball, known_of, read_ahead
+from tracker.image.sight import COV, MISFIT, SHOWN, SIZE, SPOT, UV, Known, find_ball, known_of, read_ahead
 from tracker.image.template import Template
 from tracker.image.tint import NEUTRAL, Gains
 from tracker.image.view import DEPTH, RADIUS, RAY_X, RAY_Y, SPEED_U, SPEED_V, U, V, expected_views
@@ -122,6 +123,7 @@ class Gaze:
 
     known, colours: of the camera and of each ball, as compiled code takes them.  album: their templates.
     undoing: the colour of the light that is undone, see `Gains.undoing`.  room: what is known to stand behind.
+    lately (balls, LATE): what the last looks showed of each ball, see `hidden.COUNT`; `Eyes` goes on adding to it.
     """
 
     appearance: Appearance
@@ -129,11 +131,17 @@ class Gaze:
     colours: tuple[ColourTable, ...]
     album: Album
     undoing: tuple[int, int]
+    lately: Array
     room: Room = NO_ROOM
 
     def at_such(self, appearance: Appearance) -> Gaze:
         """Return it for balls that look so."""
-        return Gaze(appearance, known_of(appearance.response), self.colours, self.album, self.undoing, self.room)
+        return replace(self, appearance=appearance, known=known_of(appearance.response))
+
+    def in_light(self, rig: Rig, gains: Gains) -> Gaze:
+        """Return it for a light of this colour."""
+        undoing = gains.undoing
+        return replace(self, colours=colours_of_each(rig.marker.balls, undoing), undoing=undoing)
 
 
 Gazes = Sequence[Gaze] | Mapping[int, Gaze]
@@ -144,7 +152,7 @@ def gaze_of(rig: Rig, appearance: Appearance, album: Album, gains: Gains = NEUTR
     """Return what a camera looks for to which balls look so, in a light of this colour."""
     undoing = gains.undoing
     colours = colours_of_each(rig.marker.balls, undoing)
-    return Gaze(appearance, known_of(appearance.response), colours, album, undoing, room)
+    return Gaze(appearance, known_of(appearance.response), colours, album, undoing, never_seen(len(rig.marker)), room)
 
 
 def look_near(frames: Sequence[Frame], rig: Rig, state: State, gazes: Gazes, things: Array) -> Look:
@@ -178,11 +186,12 @@ def _find_balls(frame: Frame, rig: Rig, state: State, gaze: Gaze, things: Array,
     for b, view in enumerate(views):
         if not (math.isfinite(view[U] + view[V]) and view[DEPTH] >= NEAREST_M):
             drawn.append(None)
+            fits[b, SHOWN] = np.nan
             look.rejections.append(Rejected(Reason.BEHIND, f"{_name(rig, b)} is not before the camera", t_ns, camera))
             continue
         templates = serve(b, view, appearance)
         drawn.append(templates)
-        failed = find_ball(image, room, b, colours[b], rows, known, templates, held, fits)
+        failed = find_ball(image, room, b, colours[b], rows, known, templates, held, gaze.lately, fits)
         if failed is None:
             row_ns = t_ns + round(eye.delay_ns(fits[b, UV][1])) if eye.readout_ns else t_ns
             look.sightings.append(BallSighting(camera, b, row_ns, uvs_px[b], covs_px2[b]))

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from tracker.image.doubt import NORMAL, OCTANTS, add_octants, disagreement, doubted_covariance
 from tracker.image.evidence import explained
 from tracker.image.full import FULL_WEIGHT, LEAST_WEIGHT, free_full, weigh_full
+from tracker.image.hidden import SHOWN, measure_shown
 from tracker.image.patch import LUMA, PLANE, TRUST, X, Y, channels_of, without_room
 from tracker.image.reading import CHROMA_VAR, LUMA_VAR, read
 from tracker.maths.compiled import compiled
@@ -22,7 +23,7 @@ FARTHEST_PX = 1.5  # a centre further from the middle pixel has run away
 ROUGH_PX = 0.5
 CONVERGED_PX = 0.02  # of the last step; what is left after it is far smaller
 RIDGE = 1.0 + 1e-9
-EVIDENCE, FIT_SIZE = 6, 7  # of what `gauss_newton` fills in
+EVIDENCE, SHARES, FIT_SIZE = 6, 7, 7 + SHOWN  # of what `gauss_newton` fills in
 
 
 @compiled("i8(i8)")
@@ -245,8 +246,8 @@ def gauss_newton(
 ) -> None:  # fmt: skip
     """Fit from a start (u, v), pixels from the patch's middle.
 
-    Fills in u, v, covariance uu, uv, vv, misfit, and the evidence that a ball is there at all: by how much chi2 is less
-    than without one.
+    Fills in u, v, covariance uu, uv, vv, misfit, the evidence that a ball is there at all: by how much chi2 is less
+    than without one; and from SHARES on how much of it is there, see `hidden.SHOWN`.
     """
     p, n_bright, n_colour = luma.shape[2], bright.shape[1], colour.shape[1]
     drawn_b, work_b, seen_b, tukey_b, squares_b = _laid_out(np.empty((_rows_of_sheet(p, 1), n_bright)), p, 1)
@@ -260,7 +261,7 @@ def gauss_newton(
     normal_b, normal_c = normals[OCTANTS], normals[OCTANTS + 1]
     misfit_b = misfit_c = at_u = at_v = 0.0
     noise_b = noise_c = 1.0
-    drawn_u = drawn_v = np.inf  # where the ball is drawn: nowhere yet
+    from_u, from_v, drawn_u, drawn_v = u, v, np.inf, np.inf  # where the ball is drawn: nowhere yet
     for iteration in range(ITERATIONS):
         at_u, at_v = on_lattice(u), on_lattice(v)
         if at_u != drawn_u or at_v != drawn_v:
@@ -288,6 +289,7 @@ def gauss_newton(
     add_octants(bright, work_b[p + PLANE + 1 :], at_u, at_v, 1.0 / noise_b, octants)
     add_octants(colour, work_c[p + PLANE + 1 :], at_u, at_v, 1.0 / noise_c, octants)
     doubted_covariance(normal, disagreement(normal_b, normal_c), octants, u - at_u, v - at_v, fit[2:5])
+    measure_shown(colour, drawn_c, work_c, small[p + PLANE : p + PLANE + 2], ball, from_u, from_v, fit[SHARES:])
     fit[5] = (misfit_b * n_bright + misfit_c * 2 * n_colour) / (n_bright + 2 * n_colour)
     evidence = explained(bright, tukey_b, squares_b, work_b) + explained(colour, tukey_c, squares_c, work_c)
     fit[EVIDENCE] = evidence / max(TINY, fit[5])

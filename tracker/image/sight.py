@@ -11,8 +11,9 @@ from tracker.image.behind import Room
 from tracker.image.centre import MAX_SHIFT_PX
 from tracker.image.colour_table import ColourTable
 from tracker.image.evidence import LEAST_EVIDENCE
+from tracker.image.hidden import AT_ONCE, IN_THE_END, hidden_variance, whole_one
 from tracker.image.holder import distrust
-from tracker.image.newton import EVIDENCE, FIT_SIZE, gauss_newton
+from tracker.image.newton import EVIDENCE, FIT_SIZE, SHARES, gauss_newton
 from tracker.image.patch import Response, cut_pixels, light_of, trust_of
 from tracker.image.reading import BALL_SIZE, CHROMA_VAR, LUMA_VAR, STREAK_U, STREAK_V
 from tracker.image.reading import RADIUS as BALL_RADIUS
@@ -26,10 +27,10 @@ REGION_SIGMA = 3.5
 REGION_MARGIN_PX = 3.0
 LINE_BYTES = 64  # what memory sends at a time
 LEAST_AREA_SHARE, MOST_AREA_SHARE = 0.15, 4.0  # of the ball's expected disc
-UV, COV, MISFIT, SPOT, SIZE = slice(0, 2), slice(2, 6), 6, slice(7, 9), 9
-"""What a fit gives: the centre [px], its covariance (uu, uv, vu, vv) [px^2], chi2 per degree of freedom, and the
-coloured spot's middle [px]."""
-_MISFIT, _SPOT_U, _SPOT_V = 6, 7, 8
+UV, COV, MISFIT, SPOT, SHOWN, SIZE = slice(0, 2), slice(2, 6), 6, slice(7, 9), slice(9, 12), 12
+"""What a fit gives: the centre [px], its covariance (uu, uv, vu, vv) [px^2], chi2 per degree of freedom, the
+coloured spot's middle [px], and how much of the ball is there, see `hidden.SHOWN`."""
+_MISFIT, _SPOT_U, _SPOT_V, _SHOWN = 6, 7, 8, 9
 _FOUND, _NO_COLOUR, _OUT_OF_VIEW, _CUT_OFF, _RAN_AWAY, _NOTHING_THERE = range(6)
 _REASONS = {
     _NO_COLOUR: Reason.NO_BALL, _OUT_OF_VIEW: Reason.AT_BORDER, _CUT_OFF: Reason.AT_BORDER, _RAN_AWAY: Reason.NO_BALL,
@@ -56,6 +57,7 @@ def find_ball(
     known: Known,
     drawn: tuple[Template, Template],
     held: Array,
+    lately: Array,
     fits: Array,
 ) -> Reason | None:
     """Find a ball near a prediction and fit its centre.
@@ -68,13 +70,16 @@ def find_ball(
         known: of the camera.
         drawn: the templates of its brightness and of its colour.
         held (balls, any, 3): see `Expected.held`.
+        lately (balls, LATE): what the last looks showed of each, see `hidden.COUNT`.
         fits (balls, SIZE): its row is filled in.
     Returns:
         None; NO_BALL when nothing of its colour and size is there but noise, or the fit runs away; AT_BORDER when it is
         cut off.
     """
     luma, chroma = drawn
-    status = _find_and_fit(image, room.mean, room.looks, ball, *colour, views, *known, *luma, *chroma, held, fits)
+    status = _find_and_fit(
+        image, room.mean, room.looks, ball, *colour, views, *known, *luma, *chroma, held, lately, fits
+    )
     return None if status == _FOUND else _REASONS[status]
 
 
@@ -155,17 +160,18 @@ def _nearest_spot(
     "i8(Array(u1, 3, 'C', True), Array(f4, 3, 'C'), Array(u1, 2, 'C'), i8,"
     "Array(i2, 2, 'C', True), Array(i2, 1, 'C', True), Array(b1, 2, 'C', True), i8, i8,"
     "f8[:, ::1], f8[::1], i8, f8[::1], f8[::1], Array(f4, 3, 'C', True), f8[::1], Array(f4, 3, 'C', True), f8[::1],"
-    "f8[:, :, ::1], f8[:, ::1])"
+    "f8[:, :, ::1], f8[:, ::1], f8[:, ::1])"
 )
 def _find_and_fit(
     image: Image, room: NDArray[np.float32], looks: NDArray[np.uint8], ball_index: int,
     least_spread: NDArray[np.int16], lowest_spread: NDArray[np.int16], hues: NDArray[np.bool_],
     blue: int, red: int, views: Array, answers: Array, block: int, light: Array, trust: Array,
     luma: NDArray[np.float32], luma_made: Array, chroma: NDArray[np.float32], chroma_made: Array, held: Array,
-    fits: Array,
+    lately: Array, fits: Array,
 ) -> int:  # fmt: skip
     """Find the spot nearest the prediction, cut its pixels out and fit them; fill in a row of fits, say how it went."""
     height, width, view, fit = image.shape[0], image.shape[1], views[ball_index], fits[ball_index]
+    fit[_SHOWN] = np.nan
     spot_u, spot_v = _nearest_spot(image, least_spread, lowest_spread, hues, blue, red, view)
     if np.isnan(spot_u):
         return _NO_COLOUR
@@ -187,6 +193,10 @@ def _find_and_fit(
     if found[EVIDENCE] < LEAST_EVIDENCE:
         return _NOTHING_THERE
     fit[0], fit[1] = found[0] + middle_u, found[1] + middle_v
-    fit[2], fit[3], fit[4], fit[5] = found[2], found[3], found[3], found[4]
+    whole = whole_one(lately)
+    at_once = hidden_variance(found[SHARES:], AT_ONCE, whole, ball)
+    hidden = max(at_once, hidden_variance(lately[ball_index], IN_THE_END, whole, ball))
+    fit[2], fit[3], fit[4], fit[5] = found[2] + hidden, found[3], found[3], found[4] + hidden
+    fit[_SHOWN:] = found[SHARES:]
     fit[_MISFIT], fit[_SPOT_U], fit[_SPOT_V] = found[5], spot_u, spot_v
     return _FOUND

@@ -12,9 +12,11 @@ from tests.tracker.paper_rig import paper_rig
 from tests.tracker.rigs import covariance, perturbed, seen_px, state
 from tracker.image.album import Album
 from tracker.image.appearance import Appearance
-from tracker.image.look import gaze_of, look_everywhere, look_near
+from tracker.image.hidden import SHARE
+from tracker.image.look import Look, gaze_of, look_everywhere, look_near
 from tracker.image.mounting import Mounting
 from tracker.image.patch import Response
+from tracker.image.sight import SHOWN
 from tracker.state import State
 from tracker.types import BallSighting, Frame, Reason, Rejected
 
@@ -24,9 +26,13 @@ SHARP = Appearance(Response(0.25, 0.25, detail=1.0))
 
 
 def look(image: Frame, expected: State) -> tuple[list[BallSighting], list[Rejected]]:
-    gazes = [gaze_of(RIG, SHARP, Album(camera)) for camera in RIG.cameras]
-    found = look_near([image], RIG, expected, gazes, Mounting(RIG.marker).things)
+    found = whole_look(image, expected)
     return found.sightings, found.rejections
+
+
+def whole_look(image: Frame, expected: State) -> Look:
+    gazes = [gaze_of(RIG, SHARP, Album(camera)) for camera in RIG.cameras]
+    return look_near([image], RIG, expected, gazes, Mounting(RIG.marker).things)
 
 
 @pytest.mark.parametrize("camera", [0, 1])
@@ -85,6 +91,14 @@ def test_balls_behind_or_at_the_lens_are_told(ahead_m: float) -> None:
     assert sightings == []
     assert len(rejections) == 3
     assert Reason.BEHIND in {r.reason for r in rejections}
+
+
+@pytest.mark.parametrize("ahead_m", [-1.0, 0.05])
+def test_a_ball_that_is_not_found_shows_nothing_of_itself(ahead_m: float) -> None:
+    camera = RIG.cameras[0]
+    there = state(0, camera.p_CinW + ahead_m * camera.R_CtoW[:, 2])
+    found = whole_look(frame(FLYING, RIG, 0, 0), there)
+    assert np.isnan(found.glances[0].fits[:, SHOWN][:, SHARE]).all()
 
 
 def test_looking_everywhere_finds_each_ball_by_its_colour() -> None:
