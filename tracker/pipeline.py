@@ -18,7 +18,7 @@ from tracker.cadence import Cadence
 from tracker.departure import Departure
 from tracker.exposed import Exposed
 from tracker.filter.continuity import Continuity
-from tracker.filter.ekf import Update
+from tracker.filter.ekf import POSED, Update
 from tracker.filter.history import History
 from tracker.filter.predict import Prediction, first_guess, predict
 from tracker.harvest import Harvest
@@ -47,8 +47,7 @@ from tracker.types import (
     TrackState,
 )
 
-POSED = 3  # sightings that make a pose; fewer fit a mistake as well
-POSED_NS = 100_000_000  # longer than this fewer carry no track
+POSED_NS = 100_000_000  # longer than this fewer sightings than make a pose carry no track: they fit a mistake as well
 NO_BREAKS: Mapping[int, float] = MappingProxyType({})
 
 

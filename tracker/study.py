@@ -7,10 +7,11 @@ from collections.abc import Callable
 
 from tracker.filter.ekf import Update, update
 from tracker.filter.predict import Prediction
-from tracker.filter.witness import Quarrel, doubted_alone, too_lonely
+from tracker.filter.witness import Quarrel, doubted_alone, too_lonely, unforeseen
 from tracker.harvest import Harvest
 from tracker.image.eyes import Eyes
 from tracker.image.look import Look
+from tracker.image.view import reach_m
 from tracker.rig import Rig
 from tracker.state import R_ZZ, State
 from tracker.tuning import Tuning
@@ -99,12 +100,20 @@ class Study:
         if isinstance(found, Update) and too_lonely(found.used, looking, len(self._rig.marker)):
             detail = f"camera {found.used[0].camera} shows {len(found.used)} of the balls, and no other one any"
             found = Rejected(Reason.ALONE, detail, ahead.state.t_ns)
+        if isinstance(found, Update) and last is not None and self._unforeseen(found, ahead):
+            detail = f"{len(found.used)} sightings make a pose, but it was not known where to look for them"
+            found = Rejected(Reason.FRAME_GATE, detail, ahead.state.t_ns)
         if isinstance(found, Update) and self._quarrel.is_new(sightings, found.used):
             detail = "two cameras contradict each other, and neither is believed yet"
             found = Rejected(Reason.FRAME_GATE, detail, ahead.state.t_ns)
         if isinstance(found, Update) and last is None and not self._all_seen_twice(found):
             found = Rejected(Reason.GEOMETRY, "not every ball fits in two cameras", ahead.state.t_ns)
         return found, look
+
+    def _unforeseen(self, found: Update, ahead: Prediction) -> bool:
+        """Say whether an update rests on few sightings of which the track could not say where they would be."""
+        P_ahead = ahead.state.P if found.P_ahead is None else found.P_ahead
+        return unforeseen(found.used, P_ahead, reach_m(self._rig))
 
     def _all_seen_twice(self, found: Update) -> bool:
         """Say whether a start is borne out by every ball in two cameras: less fits many places."""

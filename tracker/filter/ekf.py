@@ -32,7 +32,7 @@ from tracker.state import State
 from tracker.types import Array, BallSighting, Reason, Rejected
 
 MAX_SUSPECTS = 8
-POSED = 3  # sightings, which some pose fits whatever they show: their shape tells no liar
+POSED = 3  # sightings that make a pose: one fits them whatever they show, and their shape tells no liar
 
 
 class Update(NamedTuple):

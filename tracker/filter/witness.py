@@ -1,4 +1,4 @@
-"""Who bears a sighting out: a ball that comes back from hiding, and a camera that sees what no other sees.
+"""Who bears a sighting out: a ball that comes back from hiding, a camera that sees what no other sees, few sightings.
 
 While a ball is hidden the turn about the other two is open, and whatever has its colour near where it may be fits. What
 one camera sees there and another, which sees the other balls, does not, may be half a ball or two things in one: it is
@@ -14,8 +14,9 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 
 import numpy as np
 
-from tracker.state import ATTITUDE, State
-from tracker.types import BallSighting, frozen_array
+from tracker.filter.ekf import POSED
+from tracker.state import ATTITUDE, POSITION, State
+from tracker.types import Array, BallSighting, frozen_array
 
 OPEN_RAD = 0.005  # one sigma of attitude: well beyond what three balls leave
 WITNESSES = 2  # balls that a camera must see to bear witness against one more: what shows one may be lost itself
@@ -45,6 +46,22 @@ def doubted_alone(sightings: Sequence[BallSighting], last: State | None) -> tupl
         return tuple(sightings)
     seen = {camera: {s.ball for s in sightings if s.camera == camera} for camera in cameras}
     return tuple(_doubted(one) if _denied(one.ball, seen) else one for one in sightings)
+
+
+def unforeseen(used: Sequence[BallSighting], P_ahead: Array, reach_m: float) -> bool:
+    """Say whether an update rests on what might be anything: a pose's sightings where the track knew of no place.
+
+    Three sightings fit some pose whatever they show. Only the track bears them out, and not if after leaps and a gap it
+    takes a ball to be anywhere within the vehicle's reach.
+
+    Args:
+        used: the sightings of one instant.  P_ahead (n, n): the covariance of the prediction, n as of a `State`.
+        reach_m: from the marker's middle to its farthest ball [m].
+    """
+    if len(used) > POSED:
+        return False
+    _, across2, _ = np.linalg.eigvalsh(P_ahead[POSITION, POSITION]).tolist()
+    return bool(across2 > reach_m**2)  # the largest is the depth, which a camera alone leaves open
 
 
 class Quarrel:

@@ -164,11 +164,7 @@ class Eyes:
         blindly: how fast they moved was not known. It is better than nothing, and forgotten if they did move.
         """
         self._turn += 1
-        for index, glance in look.glances.items():
-            remember(glance.fits[:, SHOWN], self._gazes[index].lately)
-        self._follow_the_light(look, seen)
-        if self._settled:
-            self._notice_other_light(look, seen)
+        self._take_note(look, seen)
         if self._taught_blindly and not blindly:
             self._taught_blindly = False
             if any(look.fitted(one).streak_px > LONG_STREAK_PX for one in seen):
@@ -193,6 +189,14 @@ class Eyes:
             if one.streak_px < SMEARED * expected.radius_px:
                 self._mounting.learn(image, expected, one.sighting.ball, one.centre, camera.R_CtoW.T @ state.R_BtoW)
         self._sum_up()
+
+    def _take_note(self, look: Look, seen: Sequence[BallSighting]) -> None:
+        """Note what shows with every look: how much of each ball, the light's colour, and whether all fit as before."""
+        for index, glance in look.glances.items():
+            remember(glance.fits[:, SHOWN], self._gazes[index].lately)
+        self._follow_the_light(look, seen)
+        if self._settled:
+            self._notice_other_light(look, seen)
 
     def _notice_other_light(self, look: Look, seen: Sequence[BallSighting]) -> None:
         """Begin the light anew once all balls fit so much worse than before that it must fall otherwise now."""

@@ -64,7 +64,7 @@ CLEAR = 3.0  # times as far from its middle as the balls a vehicle reaches, with
 
 def whereabouts(state: State, rig: Rig, camera: int) -> tuple[float, float, float]:
     """Return where a camera sees the vehicle's middle (u, v), NaN behind it, and how far round it reaches [px]."""
-    return _whereabouts(state.mean, camera_table(rig)[camera], CLEAR * _reach_m(rig) * rig.cameras[camera].focal_px)
+    return _whereabouts(state.mean, camera_table(rig)[camera], CLEAR * reach_m(rig) * rig.cameras[camera].focal_px)
 
 
 @compiled("UniTuple(f8, 3)(f8[::1], f8[::1], f8)")
@@ -134,7 +134,7 @@ def _smear(mean: Array, P: Array, table: Array, seconds_by_px: Array, reach_m: f
 
 
 @lru_cache(maxsize=16)
-def _reach_m(rig: Rig) -> float:
+def reach_m(rig: Rig) -> float:
     """Return how far the farthest ball is from their middle [m]."""
     points = rig.marker.points_inB
     return float(np.linalg.norm(points - points.mean(axis=0), axis=1).max())
@@ -151,4 +151,4 @@ def unknown_streak_px(state: State, rig: Rig, exposures_s: tuple[float, ...]) ->
 
     exposures_s: of each camera.
     """
-    return _smear(state.mean, state.P, camera_table(rig), _seconds_by_px(rig, exposures_s), _reach_m(rig))
+    return _smear(state.mean, state.P, camera_table(rig), _seconds_by_px(rig, exposures_s), reach_m(rig))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.tracker.rigs import TUNING
-from tracker.filter.witness import DOUBT_PX, OPEN_RAD, Quarrel, doubted_alone, too_lonely
+from tracker.filter.witness import DOUBT_PX, OPEN_RAD, Quarrel, doubted_alone, too_lonely, unforeseen
 from tracker.state import ATTITUDE, State, mean_of, start_covariance
 from tracker.types import BallSighting, frozen_array
 
@@ -95,3 +95,21 @@ def test_one_ball_left_out_and_a_camera_that_two_others_leave_out_are_no_quarrel
     one_ball, outvoted = seen((0, 0), (0, 1), (0, 2), (1, 2)), seen(*ALL_TWICE, (2, 0), (2, 1))
     assert not Quarrel().is_new(one_ball, one_ball[:3])
     assert not Quarrel().is_new(outvoted, outvoted[:6])
+
+
+@pytest.mark.parametrize(
+    ("used", "sigmas_m", "anything"),
+    [
+        (seen((0, 2), (1, 1), (1, 2)), (0.13, 0.13, 0.13), True),
+        (seen((0, 0), (0, 1), (0, 2)), (0.13, 0.13, 0.54), True),
+        (seen((0, 0), (0, 1), (0, 2)), (0.01, 0.02, 0.54), False),
+        (seen((0, 0), (0, 2), (1, 1), (1, 2)), (0.13, 0.13, 0.13), False),
+    ],
+    ids=["track knows no place", "one camera", "only the depth is open", "more than a pose needs"],
+)
+def test_a_pose_s_sightings_are_not_believed_where_they_might_be_anything(
+    used: list[BallSighting], sigmas_m: tuple[float, float, float], anything: bool
+) -> None:
+    P_ahead = np.zeros((12, 12))
+    P_ahead[:3, :3] = np.diag(np.square(sigmas_m))
+    assert unforeseen(used, P_ahead, reach_m=0.08) is anything
