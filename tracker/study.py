@@ -48,7 +48,7 @@ class Study:
             The update, or None when nothing fits.
         """
         found = self._see(frames, ahead, harvest, last)
-        for _ in range(self._eyes.lessons_due if found is not None else 0):
+        for _ in range(self._eyes.lessons_due(found.used) if found is not None else 0):
             found = self._see(frames, ahead, Harvest(), last) or found
         return found
 

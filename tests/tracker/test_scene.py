@@ -13,7 +13,8 @@ from tracker.maths import so3
 from tracker.rig import Rig
 from tracker.scene import Lamp, Look, Occluder, Pose, SceneRenderer, Sphere, Trouble, hand
 from tracker.scene.ball import BallPainter, RayMap
-from tracker.scene.made_up import made_up_look
+from tracker.scene.random_look import random_look
+from tracker.sources.random_flight import random_flight
 from tracker.types import Array, Image
 
 HEIGHT, WIDTH = 480, 640
@@ -246,8 +247,11 @@ def test_a_lamp_that_hangs_near_lights_by_the_square_of_the_distance(rig: Rig) -
 
 def test_balls_of_made_up_rooms_are_neither_full_nor_dark() -> None:
     for seed in range(50):
-        look = made_up_look(seed, 1.0)
-        assert look == made_up_look(seed, 1.0)
-        assert 0.5 < look.on_average < 0.95
-        assert all(lamp.p_inW[2] > 0.5 for lamp in look.lamps)
-    assert len({made_up_look(seed, 1.0) for seed in range(50)}) == 50
+        look, path = random_look(seed, 1.0), random_flight(seed)
+        assert look == random_look(seed, 1.0)
+        for t_s in np.arange(0.0, 8.0, 0.2).tolist():
+            place, _ = path(t_s)
+            nearer = [np.linalg.norm(lamp.p_inW) / np.linalg.norm(lamp.p_inW - place) for lamp in look.lamps]
+            lamps = sum(lamp.share * near**2 for lamp, near in zip(look.lamps, nearer, strict=True))
+            assert 0.4 < look.ambient + 0.5 * (look.diffuse + lamps) < 1.2
+    assert len({random_look(seed, 1.0) for seed in range(50)}) == 50

@@ -16,7 +16,7 @@ from scipy.stats import chi2
 
 from tools.bench.crew import fly_all
 from tools.bench.trial import Flown, Trial
-from tracker.scene.made_up import made_up_look
+from tracker.scene.random_look import random_look
 from tracker.sources.sim import SimTiming
 from tracker.state import ATTITUDE, POSITION, RATE, VELOCITY
 from tracker.types import Array
@@ -69,7 +69,7 @@ class Consistency:
 def measure_consistency(seeds: int, gamma: float) -> Consistency:
     """Fly that many seeds. gamma: of the simulated cameras."""
     timing = SimTiming(15.0, DURATION_S)
-    runs = fly_all([Trial(f"random-{seed}", timing, made_up_look(seed, gamma), seed) for seed in range(seeds)])
+    runs = fly_all([Trial(f"random-{seed}", timing, random_look(seed, gamma), seed) for seed in range(seeds)])
     return judged(runs, gamma)
 
 

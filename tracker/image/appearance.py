@@ -68,6 +68,10 @@ class Appearance:
         shown = to_show(self.light.at(place_m), self.shown)
         return self if shown is self.shown else replace(self, shown=shown)
 
+    def recentred(self, shift_m: Array) -> Appearance:
+        """Return it about another middle of the room, shift_m (3,) from the one before in W."""
+        return replace(self, light=self.light.recentred(shift_m))
+
     def learned(
         self,
         image: Image,

@@ -17,7 +17,7 @@ import numpy as np
 
 from tracker.image.at_centre import squares_at
 from tracker.image.evidence import LEAST_EVIDENCE
-from tracker.image.hidden import AT_ONCE, WHOLE, hidden_variance
+from tracker.image.hiding import AT_ONCE, WHOLE, hidden_variance
 from tracker.image.holder import without_holders
 from tracker.image.newton import EVIDENCE, FIT_SIZE, SHARES, gauss_newton
 from tracker.image.patch import Expected, Patch, cut, extent_of, fits_in

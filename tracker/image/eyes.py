@@ -11,10 +11,11 @@ from tracker.image.album import Album
 from tracker.image.appearance import MISFIT_MAX, Appearance
 from tracker.image.behind import Behind
 from tracker.image.exposure import overexposed
-from tracker.image.hidden import remember
+from tracker.image.hiding import never_seen, remember
 from tracker.image.look import Look, gaze_of, look_near
+from tracker.image.middle import Middle
 from tracker.image.mounting import Mounting
-from tracker.image.rivals import first_rivals
+from tracker.image.rivals import Rivals, first_rivals
 from tracker.image.sight import MISFIT, SHOWN
 from tracker.image.surprise import Surprise
 from tracker.image.tint import NEUTRAL, Gains, Tint, core_colour
@@ -25,7 +26,9 @@ from tracker.types import Array, BallSighting, Frame
 
 LIGHT_BALLS = 2  # a single ball that is something else would tell of a light that is not there
 LEARN_ALL = 108  # balls of each camera under its gamma; then
-LEARN_EVERY = 11  # rounds one ball: odd, for free-running cameras have rounds in turn
+LEARN_EVERY, LEARN_SOON = 11, 5  # rounds one ball: odd, for free-running cameras have rounds in turn
+AWAY_ROUNDS = 60  # a camera that saw no ball for so long learns when it sees some again
+NOWHERE = np.full(3, np.inf)
 BLIND_PX = 0.5  # of the streak's sigma: how fast the balls move is not known
 SMEAR_DOUBT = 0.1  # of an unknown smear: what it moves the centre of a shaded ball, one sigma
 SMEARED = 0.5  # radii: a ball smeared further leaves something at the ends of its streak
@@ -38,7 +41,6 @@ class Eyes:
 
     doubts_px: (cameras,) by how much all centres may be wrong together for what is not known, one sigma [px].
     exposure_s: how long the slowest shutter stands open, as learned [s].
-    lessons_due: how often the first images should be gone over again, since nothing else is known yet.
     """
 
     def __init__(self, rig: Rig) -> None:
@@ -54,9 +56,11 @@ class Eyes:
             gaze_of(rig, Appearance(), album, room=behind.room)
             for album, behind in zip(self._albums, self._behind, strict=True)
         ]
-        self._middle_m: Array | None = None  # of the room, about which its light is known: where the first ball taught
-        self._place_m = np.zeros(3)  # from there, where balls look as is known now
+        self._middle = Middle()
+        self._place_m = NOWHERE  # from there, where balls look as is known now
         self._turn = 0
+        self._noted_ns = -1
+        self._seen_at = [0] * len(rig.cameras)  # in which turn each saw a ball
         self._taught_blindly = False
         self._sum_up()
 
@@ -69,12 +73,17 @@ class Eyes:
         self._by_place = any(appearance.light.room.differs for appearance in appearances)
         self._exposures_s = tuple([appearance.response.exposure_s for appearance in appearances])
         self.exposure_s = max(self._exposures_s)
-        self.lessons_due = max(rivals.lessons_due for rivals in self._rivals)
+        self._lessons_due = max(rivals.lessons_due for rivals in self._rivals)
         self.doubts_px = np.array([rivals.doubt_px for rivals in self._rivals])
-        self._gamma_known = all(rivals.settled or rivals.by_room for rivals in self._rivals)  # if not for the last time
-        enough = all(rivals.count >= LEARN_ALL or rivals.has_seen(LEARN_ALL) for rivals in self._rivals)
+        awake = [each for each, at in zip(self._rivals, self._seen_at, strict=True) if self._turn - at <= AWAY_ROUNDS]
+        self._gamma_known = all(rivals.settled or rivals.by_room for rivals in awake)  # if not for the last time
+        enough = all(rivals.count >= LEARN_ALL or rivals.has_seen(LEARN_ALL) for rivals in awake)
         self._settled = self._gamma_known and enough  # how balls look is known, so that little is left to learn
-        self._every = LEARN_EVERY if all(rivals.settled for rivals in self._rivals) else 1
+        self._every = LEARN_EVERY if all(rivals.settled for rivals in awake) else 1
+
+    def lessons_due(self, seen: Sequence[BallSighting]) -> int:
+        """Return how often images should be gone over again, since nothing else is known yet to cameras that saw."""
+        return max(self._rivals[one.camera].lessons_due for one in seen) if self._lessons_due else 0
 
     def stand(self, rig: Rig) -> None:
         """Take the cameras to stand elsewhere."""
@@ -117,10 +126,10 @@ class Eyes:
 
     def _go_along(self, state: State) -> None:
         """Take balls to look as they do where the vehicle is: lamps that hang near light it from other sides there."""
-        if self._middle_m is None or not self._by_place:
+        if not (self._by_place and self._middle.is_known):
             return
-        place_m = state.p_BinW - self._middle_m
-        if math.dist(place_m, self._place_m) > PLACE_STEP_M:
+        place_m = self._middle.place(state.p_BinW)
+        if not math.dist(place_m, self._place_m) <= PLACE_STEP_M:
             self._place_m = place_m
             self._rivals = [rivals.at(place_m) for rivals in self._rivals]
             self._sum_up()
@@ -164,20 +173,18 @@ class Eyes:
         blindly: how fast they moved was not known. It is better than nothing, and forgotten if they did move.
         """
         self._turn += 1
-        self._take_note(look, seen)
+        self._take_note(look, seen, blindly=blindly)
         if self._taught_blindly and not blindly:
             self._taught_blindly = False
             if any(look.fitted(one).streak_px > LONG_STREAK_PX for one in seen):
-                self._rivals = [first_rivals() for _ in self._rig.cameras]
-                self._sum_up()
+                self._begin_anew([first_rivals() for _ in self._rig.cameras])
         self._taught_blindly |= blindly and not self._gamma_known
-        if self._middle_m is None:
-            self._middle_m = state.p_BinW.copy()
-        place_m = state.p_BinW - self._middle_m
         if self._settled:
-            if self._turn % self._every:
+            every = min(self._every, LEARN_SOON) if self._surprise.is_some else self._every
+            if self._turn % every:
                 return
-            seen = [seen[self._turn // self._every % len(seen)]]
+            seen = [seen[self._turn // every % len(seen)]]
+        place_m = self._placed(state)
         for sighting in seen:
             one, index = look.fitted(sighting), sighting.camera
             camera, image = self._rig.cameras[index], one.frame.image
@@ -190,12 +197,24 @@ class Eyes:
                 self._mounting.learn(image, expected, one.sighting.ball, one.centre, camera.R_CtoW.T @ state.R_BtoW)
         self._sum_up()
 
-    def _take_note(self, look: Look, seen: Sequence[BallSighting]) -> None:
+    def _placed(self, state: State) -> Array:
+        """Return where the vehicle teaches from the room's middle (3,) [m], which moves on with it."""
+        shift_m = self._middle.moved(state.p_BinW)
+        if shift_m is not None:
+            self._place_m = self._place_m - shift_m
+            self._rivals = [rivals.recentred(shift_m) for rivals in self._rivals]
+        return self._middle.place(state.p_BinW)
+
+    def _take_note(self, look: Look, seen: Sequence[BallSighting], *, blindly: bool) -> None:
         """Note what shows with every look: how much of each ball, the light's colour, and whether all fit as before."""
-        for index, glance in look.glances.items():
+        newest_ns = max([glance.frame.t_ns for glance in look.glances.values()])
+        again, self._noted_ns = newest_ns == self._noted_ns, newest_ns
+        for one in seen:
+            self._seen_at[one.camera] = self._turn
+        for index, glance in look.glances.items() if not again else ():
             remember(glance.fits[:, SHOWN], self._gazes[index].lately)
         self._follow_the_light(look, seen)
-        if self._settled:
+        if self._settled and not (again or blindly):
             self._notice_other_light(look, seen)
 
     def _notice_other_light(self, look: Look, seen: Sequence[BallSighting]) -> None:
@@ -204,9 +223,15 @@ class Eyes:
             misfit_of = glance.fits.item
             self._surprise.take(camera, [misfit_of(one.ball, MISFIT) for one in seen if one.camera == camera])
         if self._surprise.is_great:
-            self._rivals = [rivals.in_other_light() for rivals in self._rivals]
-            self._surprise = Surprise(len(self._rivals))
-            self._sum_up()
+            self._begin_anew([rivals.in_other_light() for rivals in self._rivals])
+
+    def _begin_anew(self, rivals: list[Rivals]) -> None:
+        """Know no more of how balls look than some rivals do."""
+        self._rivals, self._surprise = rivals, Surprise(len(rivals))
+        self._middle, self._place_m = Middle(), NOWHERE
+        for gaze in self._gazes:
+            gaze.lately[:] = never_seen(len(gaze.lately))
+        self._sum_up()
 
     def look_behind(self, frames: Sequence[Frame], state: State) -> None:
         """Learn the room where the vehicle is not, by frames of about a state's time; once it is known, by some."""

@@ -25,7 +25,7 @@ MOVING = 9
 """Terms that differ by place: those of degrees 0, 1 and 2, of the others too little reaches a ball."""
 ROOM_TERMS = TERMS + 3 * MOVING
 """The light in the room's middle, and by how much its first terms grow along x, y and z of W [1/m]."""
-FARTHEST_M = 0.8  # from the middle: beyond, what was learned in between is not carried on
+FARTHEST_M = 0.6  # from the middle: beyond, what was learned in between is not carried on
 EVEN = 8.0  # of each term before any ball: two lamps that share half of the light have a sigma of 0.35
 NEAR_MISFIT = 0.75  # of what far lamps leave unexplained, at most, for near ones to be believed
 ONE = 1e3  # how firmly the even light is held to 1, beside what is learned
@@ -70,9 +70,11 @@ class RoomLight:
 
     def terms_at(self, place_m: Array) -> Array:
         """Return the terms (TERMS,) at a place (3,) from the middle in W [m]."""
-        terms = self.terms[:TERMS].copy()
-        terms[:MOVING] += within(place_m) @ self.terms[TERMS:].reshape(3, MOVING)
-        terms /= max(terms[0], _DIMMEST)
+        terms, grown = self.terms[:TERMS].copy(), within(place_m) @ self.terms[TERMS:].reshape(3, MOVING)
+        if terms[0] + grown[0] < _DIMMEST:  # a straight line leads to no light, which there is none without
+            grown *= (terms[0] - _DIMMEST) / -grown[0]
+        terms[:MOVING] += grown
+        terms /= terms[0]
         return terms
 
     def lamp_at(self, place_m: Array) -> Array:
@@ -80,6 +82,23 @@ class RoomLight:
         towards = self.lamp - self.nearness * within(place_m)
         unit: Array = towards / np.linalg.norm(towards)
         return unit
+
+    def recentred(self, shift_m: Array) -> RoomLight:
+        """Return the same light about another middle, shift_m (3,) from the one before in W."""
+        terms = about(-shift_m) @ self.terms
+        return RoomLight(terms / max(terms[0], _DIMMEST), self.lamp_at(shift_m), self.nearness, self.differs)
+
+
+def about(shift_m: Array) -> Array:
+    """Return M (ROOM_TERMS, ROOM_TERMS): M times the terms about a middle shifted by shift_m (3,) are those about it.
+
+    Source: a ball at d from the new middle is at d + shift from the old one, so a' = a + sum_k shift_k b_k.
+    """
+    by = np.eye(ROOM_TERMS)
+    for k, along_m in enumerate(shift_m.tolist()):
+        some = slice(TERMS + MOVING * k, TERMS + MOVING * (k + 1))
+        by[:MOVING, some] = -along_m * np.eye(MOVING)
+    return by
 
 
 def within(place_m: Array) -> Array:

@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tracker.image.harmonics import LAMBERT, TERMS, turned
-from tracker.image.lamps import MOVING, ROOM_TERMS, RoomLight, explained, within
+from tracker.image.lamps import MOVING, ROOM_TERMS, RoomLight, about, explained, within
 from tracker.image.template import GLOSS, Shades, Vector
 from tracker.maths.compiled import compiled
 from tracker.maths.covariance import propagated
@@ -58,6 +58,12 @@ class Light:
     def at(self, place_m: Array) -> Light:
         """Return it at a place (3,) from the room's middle in W [m]."""
         return replace(self, lamp=self.room.lamp_at(place_m), terms=self.room.terms_at(place_m))
+
+    def recentred(self, shift_m: Array) -> Light:
+        """Return the same light about another middle of the room, shift_m (3,) from the one before in W."""
+        by = about(shift_m)
+        after = by.T @ self.information @ by
+        return replace(self, room=self.room.recentred(shift_m), information=after, target=by.T @ self.target)
 
     def learned(self, information: Array, target: Array, R_RtoW: Array, place_m: Array = MIDDLE) -> Light:
         """Return it with what one more ball teaches; the same when the ball has no brightness of its own.

@@ -17,7 +17,7 @@ from tracker.image.behind import NO_ROOM, Room
 from tracker.image.centre import Centre
 from tracker.image.colour_table import ColourTable, colours_of_each
 from tracker.image.detect import Blob, find_blobs
-from tracker.image.hidden import never_seen
+from tracker.image.hiding import never_seen
 from tracker.image.mounting import things_seen
 from tracker.image.patch import Expected
 from tracker.image.sight import COV, MISFIT, SHOWN, SIZE, SPOT, UV, Known, find_ball, known_of, read_ahead
@@ -123,7 +123,7 @@ class Gaze:
 
     known, colours: of the camera and of each ball, as compiled code takes them.  album: their templates.
     undoing: the colour of the light that is undone, see `Gains.undoing`.  room: what is known to stand behind.
-    lately (balls, LATE): what the last looks showed of each ball, see `hidden.COUNT`; `Eyes` goes on adding to it.
+    lately (balls, LATE): what the last looks showed of each ball, see `hiding.COUNT`; `Eyes` goes on adding to it.
     """
 
     appearance: Appearance

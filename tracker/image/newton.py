@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from tracker.image.doubt import NORMAL, OCTANTS, add_octants, disagreement, doubted_covariance
 from tracker.image.evidence import explained
 from tracker.image.full import FULL_WEIGHT, LEAST_WEIGHT, free_full, weigh_full
-from tracker.image.hidden import SHOWN, measure_shown
+from tracker.image.hiding import SHOWN, measure_shown
 from tracker.image.patch import LUMA, PLANE, TRUST, X, Y, channels_of, without_room
 from tracker.image.reading import CHROMA_VAR, LUMA_VAR, read
 from tracker.maths.compiled import compiled
@@ -247,7 +247,7 @@ def gauss_newton(
     """Fit from a start (u, v), pixels from the patch's middle.
 
     Fills in u, v, covariance uu, uv, vv, misfit, the evidence that a ball is there at all: by how much chi2 is less
-    than without one; and from SHARES on how much of it is there, see `hidden.SHOWN`.
+    than without one; and from SHARES on how much of it is there, see `hiding.SHOWN`.
     """
     p, n_bright, n_colour = luma.shape[2], bright.shape[1], colour.shape[1]
     drawn_b, work_b, seen_b, tukey_b, squares_b = _laid_out(np.empty((_rows_of_sheet(p, 1), n_bright)), p, 1)

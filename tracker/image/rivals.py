@@ -100,7 +100,7 @@ class Rivals:
         """Return the rivals after one more ball; arguments as for `Appearance.learned`, others of other cameras."""
         if found.misfit > MISFIT_MAX:
             return self
-        if self.settled and not self.by_room and behind_is_known(ball):
+        if self._may_go_by_room and behind_is_known(ball):
             around = _around(self.best, APART, self.pull_px, by_room=True)
             return around.learned(image, camera, ball, found, others, place_m)
         if self.settled:
@@ -126,9 +126,18 @@ class Rivals:
         return after._judged() if after._due() else after
 
     def in_other_light(self) -> Rivals:
-        """Return them with the light to be learned from nothing; what is known of the camera stays."""
-        appearances = tuple(appearance.in_other_light() for appearance in self.appearances)
-        return Rivals(appearances, (0.0,) * len(appearances), 0, self.pull_px, self.by_room, self.doubt)
+        """Return the best with the light to be learned from nothing; a search by the room must begin anew."""
+        by_room = self.by_room and self.settled
+        return Rivals((self.best.in_other_light(),), (0.0,), 0, self.pull_px, by_room, self.doubt)
+
+    def recentred(self, shift_m: Array) -> Rivals:
+        """Return them about another middle of the room, shift_m (3,) from the one before in W."""
+        return replace(self, appearances=tuple(one.recentred(shift_m) for one in self.appearances))
+
+    @property
+    def _may_go_by_room(self) -> bool:
+        """Say whether gamma may be looked for again by the room: once, and in a light that is known."""
+        return self.settled and not self.by_room and self.best.light.count >= ROUND_BALLS
 
     def _due(self) -> bool:
         """Say whether to judge them: they differ clearly, or will hardly ever."""

@@ -11,7 +11,7 @@ from tracker.image.behind import Room
 from tracker.image.centre import MAX_SHIFT_PX
 from tracker.image.colour_table import ColourTable
 from tracker.image.evidence import LEAST_EVIDENCE
-from tracker.image.hidden import AT_ONCE, IN_THE_END, hidden_variance, whole_one
+from tracker.image.hiding import AT_ONCE, IN_THE_END, hidden_variance, whole_one
 from tracker.image.holder import distrust
 from tracker.image.newton import EVIDENCE, FIT_SIZE, SHARES, gauss_newton
 from tracker.image.patch import Response, cut_pixels, light_of, trust_of
@@ -29,7 +29,7 @@ LINE_BYTES = 64  # what memory sends at a time
 LEAST_AREA_SHARE, MOST_AREA_SHARE = 0.15, 4.0  # of the ball's expected disc
 UV, COV, MISFIT, SPOT, SHOWN, SIZE = slice(0, 2), slice(2, 6), 6, slice(7, 9), slice(9, 12), 12
 """What a fit gives: the centre [px], its covariance (uu, uv, vu, vv) [px^2], chi2 per degree of freedom, the
-coloured spot's middle [px], and how much of the ball is there, see `hidden.SHOWN`."""
+coloured spot's middle [px], and how much of the ball is there, see `hiding.SHOWN`."""
 _MISFIT, _SPOT_U, _SPOT_V, _SHOWN = 6, 7, 8, 9
 _FOUND, _NO_COLOUR, _OUT_OF_VIEW, _CUT_OFF, _RAN_AWAY, _NOTHING_THERE = range(6)
 _REASONS = {
@@ -70,7 +70,7 @@ def find_ball(
         known: of the camera.
         drawn: the templates of its brightness and of its colour.
         held (balls, any, 3): see `Expected.held`.
-        lately (balls, LATE): what the last looks showed of each, see `hidden.COUNT`.
+        lately (balls, LATE): what the last looks showed of each, see `hiding.COUNT`.
         fits (balls, SIZE): its row is filled in.
     Returns:
         None; NO_BALL when nothing of its colour and size is there but noise, or the fit runs away; AT_BORDER when it is

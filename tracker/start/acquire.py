@@ -21,7 +21,7 @@ from tracker.types import Array, Frame, Point, Reason, Rejected
 
 CENTROID_SIGMA_PX = 0.7  # of a colour blob's centroid, blur and shading included
 SPOT_SHARE = 0.5  # of a ball's radius: how far off its middle a spot's may be
-MAX_SPOTS = 256  # per ball and camera, largest first: wood and bricks make hundreds of orange ones
+MAX_SPOTS = 256  # per ball and camera of two, largest first: wood and bricks make hundreds of orange ones
 MAX_PLACES = 512  # per ball, those first where rays miss each other least
 TRIGGERED_S = 1e-4  # one sigma of what is left between the clocks of cameras with one trigger
 START_POSITION_M, START_ATTITUDE_RAD = 0.05, 0.3  # broad against the first fit, narrow against the room
@@ -115,23 +115,26 @@ def _clock_sigmas(seen: Seen, rig: Rig, process: Process) -> Array:
 
 def _places(ball: int, seen: Seen, rig: Rig, slack_m: float) -> list[Point]:
     """Return where rays of one ball's colour from two cameras meet and the ball would look as large, best first."""
-    found = []
-    rays = {camera: _rays(camera, ball, blobs[ball], rig) for camera, (_, blobs) in seen.items() if blobs[ball]}
-    for a, b in combinations(sorted(rays), 2):
+    found: list[Point] = []
+    cameras = sorted(camera for camera, (_, blobs) in seen.items() if blobs[ball])
+    pairs = list(combinations(cameras, 2))
+    most = int(MAX_SPOTS / max(1.0, len(pairs)) ** 0.5)  # as many rays to compare, however many cameras there are
+    rays = {camera: _rays(camera, ball, seen[camera][1][ball][:most], rig) for camera in cameras}
+    for a, b in pairs:
         first, second = rig.cameras[a], rig.cameras[b]
         sigma = CENTROID_SIGMA_PX / min(first.focal_px, second.focal_px)
-        found += meetings(rays[a], rays[b], np.stack((first.p_CinW, second.p_CinW)), sigma, slack_m)
+        found += meetings(rays[a], rays[b], np.stack((first.p_CinW, second.p_CinW)), sigma, slack_m, MAX_PLACES)
     return sorted(found, key=lambda point: point.miss_m)[:MAX_PLACES]
 
 
 def _rays(camera: int, ball: int, blobs: Sequence[Blob], rig: Rig) -> Rays:
-    """Return the bearings to the largest blobs, and how far off a ball is that shows so much of its colour.
+    """Return the bearings to blobs, and how far off a ball is that shows so much of its colour.
 
     Source: a ball of radius r at a distance d shows a disc of pi (f r / d)^2, and as much of its colour as a track
         takes for it too.
     """
-    eye, largest = rig.cameras[camera], blobs[:MAX_SPOTS]
-    uv_px, area_px = np.array([blob.uv_px for blob in largest]), np.array([blob.area_px for blob in largest])
+    eye = rig.cameras[camera]
+    uv_px, area_px = np.array([blob.uv_px for blob in blobs]), np.array([blob.area_px for blob in blobs])
     whole_m = eye.focal_px * rig.marker.balls[ball].radius_m * np.sqrt(np.pi / area_px)  # off, if all of it shows
     within_m = np.outer(whole_m, np.sqrt((LEAST_AREA_SHARE, MOST_AREA_SHARE)))
     return Rays(np.ascontiguousarray(eye.bearings(uv_px) @ eye.R_CtoW.T), within_m)

@@ -47,13 +47,14 @@ class Rays(NamedTuple):
     within_m: Array
 
 
-def meetings(a: Rays, b: Rays, p_CinW: Array, sigma_bearing: float, slack_m: float) -> list[Point]:
+def meetings(a: Rays, b: Rays, p_CinW: Array, sigma_bearing: float, slack_m: float, most: int) -> list[Point]:
     """Find where rays of one camera meet rays of another: the epipolar constraint, in metres.
 
     Args:
         a, b: of one camera and of the other.
         p_CinW: (2, 3) the cameras' centres [m].  sigma_bearing: as `triangulate` takes it.
         slack_m: what rays may miss each other by beyond what their own uncertainty allows [m].
+        most: how many points to return, those first where rays miss each other least.
     Returns:
         Those of their points that `triangulate` does not reject, where they miss each other by no more than that and
         where both may be.
@@ -63,12 +64,13 @@ def meetings(a: Rays, b: Rays, p_CinW: Array, sigma_bearing: float, slack_m: flo
     count = len(pairs)
     met, places, covariances = np.empty((count, 4)), np.empty((count, 3)), np.empty((count, 3, 3))
     _met(a.u_inW, b.u_inW, pairs, p_CinW, sigma_bearing, met, places, covariances)
+    cosine, least_reach_m, miss_m, sigma_m = met.T
+    good = (cosine <= PARALLEL_COSINE) & (least_reach_m > 0.0) & (miss_m <= slack_m + MISS_SIGMA * sigma_m)
+    kept = np.flatnonzero(good)
+    kept = kept[np.argsort(miss_m[kept], kind="stable")[:most]]
     return [
-        Point(frozen_array(place), frozen_array(covariance), miss_m)
-        for (cosine, least_reach_m, miss_m, sigma_m), place, covariance in zip(
-            met.tolist(), places, covariances, strict=True
-        )
-        if cosine <= PARALLEL_COSINE and least_reach_m > 0.0 and miss_m <= slack_m + MISS_SIGMA * sigma_m
+        Point(frozen_array(place), frozen_array(covariance), miss)
+        for place, covariance, miss in zip(places[kept], covariances[kept], miss_m[kept].tolist(), strict=True)
     ]
 
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tracker.image.harmonics import LAMBERT, TERMS, terms_at
-from tracker.image.lamps import ROOM_TERMS, explained
+from tracker.image.lamps import FARTHEST_M, ROOM_TERMS, explained
 from tracker.image.light import Light
 from tracker.maths.sphere import spread
 from tracker.types import Array
@@ -84,6 +84,9 @@ def test_no_light_is_negative(seed: int) -> None:
     assert (terms @ terms_at(NORMALS)).min() > SHADOW
     assert terms[0] == pytest.approx(1.0)
     assert np.linalg.norm(room.lamp) == pytest.approx(1.0)
+    for place_m in FARTHEST_M * np.vstack((np.eye(3), -np.eye(3))):
+        assert room.terms_at(place_m)[0] == pytest.approx(1.0)
+        assert np.isfinite(room.terms_at(place_m)).all()
 
 
 NEAR_M = np.array([0.9, -0.7, 1.4])  # where a lamp hangs
@@ -123,3 +126,14 @@ def test_a_lamp_that_is_far_away_lights_all_places_alike() -> None:
     light = learned_about(near=False)
     assert light.at(ELSEWHERE).apart_from(light.at(np.zeros(3))) < 0.01
     assert misjudged(light.at(ELSEWHERE), lamps_from(ELSEWHERE, near=False)) < 0.06
+
+
+def test_light_is_the_same_about_another_middle() -> None:
+    light, shift_m = learned_about(near=True), np.array([0.2, -0.1, 0.1])
+    other = light.recentred(shift_m)
+    assert np.allclose(other.at(ELSEWHERE - shift_m).terms, light.at(ELSEWHERE).terms)
+    # Balls that teach there say the same of it.
+    seen = equations(lamps_from(ELSEWHERE, near=True), SIDES[0], 1.0, 99)
+    anew = other.learned(*seen, NO_TURN, ELSEWHERE - shift_m).solved([]).at(np.zeros(3))
+    as_before = light.learned(*seen, NO_TURN, ELSEWHERE).solved([]).at(shift_m)
+    assert anew.apart_from(as_before) < 0.05

@@ -12,7 +12,7 @@ from tests.tracker.paper_rig import paper_rig
 from tests.tracker.rigs import covariance, perturbed, seen_px, state
 from tracker.image.album import Album
 from tracker.image.appearance import Appearance
-from tracker.image.hidden import SHARE
+from tracker.image.hiding import SHARE
 from tracker.image.look import Look, gaze_of, look_everywhere, look_near
 from tracker.image.mounting import Mounting
 from tracker.image.patch import Response

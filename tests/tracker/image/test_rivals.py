@@ -44,9 +44,9 @@ def judged(*misfits: float) -> Rivals:
     return rivals.learned(developed(canvas), CAMERA, ball, found)
 
 
-def settled_at(gamma: float) -> Rivals:
-    """Return a search that is over, made before the room was known."""
-    return Rivals((Appearance(Response(gamma=gamma)),), (0.0,), 200, np.zeros(2))
+def settled_at(gamma: float, balls: int = 200) -> Rivals:
+    """Return a search that is over, made before the room was known, and the light learned from so many balls."""
+    return Rivals((Appearance(Response(gamma=gamma), Light(count=balls)),), (0.0,), 200, np.zeros(2))
 
 
 def one_ball_more(rivals: Rivals, room: Room, gamma: float | None = None) -> Rivals:
@@ -109,6 +109,14 @@ def test_once_the_room_is_known_the_gamma_is_looked_for_again(found: float, trie
     again = one_ball_more(settled_at(found), KNOWN_ROOM)
     assert gammas(again) == pytest.approx(tried)
     assert again.by_room
+
+
+def test_while_the_light_is_hardly_known_no_gamma_is_looked_for_by_the_room() -> None:
+    assert one_ball_more(settled_at(1.7, balls=5), KNOWN_ROOM).settled
+    searching = replace(one_ball_more(settled_at(1.7), KNOWN_ROOM), misfits=(0.0, 1.0, 2.0))
+    anew = searching.in_other_light()
+    assert (anew.settled, anew.by_room) == (True, False)
+    assert one_ball_more(anew, NO_ROOM).best.light.count == 1
 
 
 def test_a_gamma_found_by_the_room_is_kept() -> None:

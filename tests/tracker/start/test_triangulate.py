@@ -119,7 +119,7 @@ def test_rays_meet_only_where_both_may_be(camera: int, share: float, found: bool
     p, p_CinW = np.array([0.1, -0.2, 0.3]), centres(2)
     a, b = (anywhere(u[None]) for u in directions(p, p_CinW))
     (a, b)[camera].within_m[0, 1] = share * np.linalg.norm(p - p_CinW[camera])
-    assert len(meetings(a, b, p_CinW, SIGMA_RAD, 0.0)) == found
+    assert len(meetings(a, b, p_CinW, SIGMA_RAD, 0.0, 100)) == found
 
 
 def test_rays_of_two_cameras_meet_where_each_pair_of_them_is_triangulated() -> None:
@@ -130,9 +130,10 @@ def test_rays_of_two_cameras_meet_where_each_pair_of_them_is_triangulated() -> N
     pairs = [triangulate(np.stack((u, v)), p_CinW, SIGMA_RAD) for u in a for v in b]
     points = [point for point in pairs if isinstance(point, Point)]
     near = [p for p in points if p.miss_m <= 0.1 + MISS_SIGMA * np.sqrt(np.trace(p.covariance) / 3.0)]
-    met = meetings(anywhere(a), anywhere(b), p_CinW, SIGMA_RAD, 0.1)
+    met = meetings(anywhere(a), anywhere(b), p_CinW, SIGMA_RAD, 0.1, 100)
     assert 0 < len(met) == len(near) < len(points) < len(pairs)
-    for one, other in zip(met, near, strict=True):
+    assert len(meetings(anywhere(a), anywhere(b), p_CinW, SIGMA_RAD, 0.1, 2)) == 2
+    for one, other in zip(met, sorted(near, key=lambda point: point.miss_m), strict=True):
         assert np.array_equal(one.p_inW, other.p_inW)
         assert np.array_equal(one.covariance, other.covariance)
         assert one.miss_m == other.miss_m

@@ -7,14 +7,14 @@ import numpy as np
 from tracker.scene.look import Lamp, Look
 
 LAMPS = 3  # at most, besides the main one
-ASIDE_M, ABOVE_M = 2.0, (0.8, 2.2)  # where they hang, from W's origin
+ASIDE_M, ABOVE_M = 2.0, (1.0, 2.2)  # where they hang, from W's origin
 MAIN_ELEVATION_DEG = (15.0, 85.0)
 BRIGHTNESS = (0.55, 0.90)  # on average over a ball: a sensible exposure, balls neither full nor dim
 GLOSSINESS = (0.0, 0.25)  # satin paint
 AMBIENT_SHARE = (0.25, 0.65)  # of that
 
 
-def made_up_look(seed: int, gamma: float) -> Look:
+def random_look(seed: int, gamma: float) -> Look:
     """Make up a room's light and its cameras' lens and sensor. gamma: of the cameras.
 
     A main lamp or window far away on any side, up to LAMPS lamps that hang near, light that walls throw back, paint

@@ -11,7 +11,7 @@ from tests.tracker.drawing import developed, draw_ball, draw_band, empty_canvas,
 from tests.tracker.image.test_centre import BALL, CAMERA, RADIUS_PX, accustomed, expected
 from tracker.image.appearance import Appearance
 from tracker.image.centre import Centre, fit_centre, numbers_of, templates_of
-from tracker.image.hidden import (
+from tracker.image.hiding import (
     AT_ONCE,
     BY_CHANCE,
     IN_THE_END,
