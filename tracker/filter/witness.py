@@ -19,6 +19,7 @@ from tracker.state import ATTITUDE, POSITION, State
 from tracker.types import Array, BallSighting, frozen_array
 
 OPEN_RAD = 0.005  # one sigma of attitude: well beyond what three balls leave
+GAP_S = 0.1  # longer than between cameras, or their frames
 WITNESSES = 2  # balls that a camera must see to bear witness against one more: what shows one may be lost itself
 DOUBT_PX = 1.5  # one sigma: half a ball's radius and more
 
@@ -48,17 +49,18 @@ def doubted_alone(sightings: Sequence[BallSighting], last: State | None) -> tupl
     return tuple(_doubted(one) if _denied(one.ball, seen) else one for one in sightings)
 
 
-def unforeseen(used: Sequence[BallSighting], P_ahead: Array, reach_m: float) -> bool:
+def unforeseen(used: Sequence[BallSighting], gap_s: float, P_ahead: Array, reach_m: float) -> bool:
     """Say whether an update rests on what might be anything: a pose's sightings where the track knew of no place.
 
-    Three sightings fit some pose whatever they show. Only the track bears them out, and not if after leaps and a gap it
-    takes a ball to be anywhere within the vehicle's reach.
+    Three sightings fit some pose whatever they show. Only the track bears them out, and not if after a gap it takes a
+    ball to be anywhere within the vehicle's reach. Without a gap that is a track just started, whose speed is open.
 
     Args:
-        used: the sightings of one instant.  P_ahead (n, n): the covariance of the prediction, n as of a `State`.
+        used: the sightings of one instant.  gap_s: since those before.
+        P_ahead (n, n): the covariance of the prediction, n as of a `State`.
         reach_m: from the marker's middle to its farthest ball [m].
     """
-    if len(used) > POSED:
+    if len(used) > POSED or gap_s <= GAP_S:
         return False
     _, across2, _ = np.linalg.eigvalsh(P_ahead[POSITION, POSITION]).tolist()
     return bool(across2 > reach_m**2)  # the largest is the depth, which a camera alone leaves open
