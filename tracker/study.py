@@ -113,7 +113,7 @@ class Study:
     def _unforeseen(self, found: Update, ahead: Prediction) -> bool:
         """Say whether an update rests on few sightings of which the track could not say where they would be."""
         P_ahead = ahead.state.P if found.P_ahead is None else found.P_ahead
-        return unforeseen(found.used, ahead.dt, P_ahead, reach_m(self._rig))
+        return unforeseen(found.used, len(self._rig.marker), ahead.dt, P_ahead, reach_m(self._rig))
 
     def _all_seen_twice(self, found: Update) -> bool:
         """Say whether a start is borne out by every ball in two cameras: less fits many places."""

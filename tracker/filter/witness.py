@@ -49,21 +49,24 @@ def doubted_alone(sightings: Sequence[BallSighting], last: State | None) -> tupl
     return tuple(_doubted(one) if _denied(one.ball, seen) else one for one in sightings)
 
 
-def unforeseen(used: Sequence[BallSighting], gap_s: float, P_ahead: Array, reach_m: float) -> bool:
+def unforeseen(used: Sequence[BallSighting], balls: int, gap_s: float, P_ahead: Array, reach_m: float) -> bool:
     """Say whether an update rests on what might be anything: a pose's sightings where the track knew of no place.
 
-    Three sightings fit some pose whatever they show. Only the track bears them out, and not if after a gap it takes a
-    ball to be anywhere within the vehicle's reach. Without a gap that is a track just started, whose speed is open.
+    Three sightings fit some pose whatever they show. Only the track bears them out, and not if it takes a ball to be
+    anywhere within half of the vehicle's reach, where other balls may be too. All the balls in one camera are their own
+    witnesses as long as there is no gap: a track just started, by cameras that see in turn, does not know its speed.
 
     Args:
-        used: the sightings of one instant.  gap_s: since those before.
+        used: the sightings of one instant.  balls: of the marker.  gap_s: since the sightings before.
         P_ahead (n, n): the covariance of the prediction, n as of a `State`.
         reach_m: from the marker's middle to its farthest ball [m].
     """
-    if len(used) > POSED or gap_s <= GAP_S:
+    if len(used) > POSED:
+        return False
+    if len(used) == balls and len({sighting.camera for sighting in used}) == 1 and gap_s <= GAP_S:
         return False
     _, across2, _ = np.linalg.eigvalsh(P_ahead[POSITION, POSITION]).tolist()
-    return bool(across2 > reach_m**2)  # the largest is the depth, which a camera alone leaves open
+    return bool(across2 > (reach_m / 2.0) ** 2)  # the largest is the depth, which a camera alone leaves open
 
 
 class Quarrel:

@@ -105,12 +105,22 @@ def test_one_ball_left_out_and_a_camera_that_two_others_leave_out_are_no_quarrel
         (seen((0, 0), (0, 1), (0, 2)), 0.2, (0.01, 0.02, 0.54), False),
         (seen((0, 0), (0, 2), (1, 1), (1, 2)), 0.2, (0.13, 0.13, 0.13), False),
         (seen((0, 0), (0, 1), (0, 2)), 0.067, (0.13, 0.13, 0.54), False),
+        (seen((0, 1), (1, 0), (1, 1)), 0.067, (0.05, 0.06, 0.08), True),
+        (seen((0, 1), (1, 0), (1, 1)), 0.067, (0.01, 0.02, 0.04), False),
     ],
-    ids=["track knows no place", "one camera", "only the depth is open", "more than a pose needs", "a track's start"],
+    ids=[
+        "track knows no place",
+        "one camera",
+        "only the depth is open",
+        "more than a pose needs",
+        "a track's start",
+        "some balls each",
+        "near where they are expected",
+    ],
 )
 def test_a_pose_s_sightings_are_not_believed_where_they_might_be_anything(
     used: list[BallSighting], gap_s: float, sigmas_m: tuple[float, float, float], anything: bool
 ) -> None:
     P_ahead = np.zeros((12, 12))
     P_ahead[:3, :3] = np.diag(np.square(sigmas_m))
-    assert unforeseen(used, gap_s, P_ahead, reach_m=0.08) is anything
+    assert unforeseen(used, 3, gap_s, P_ahead, reach_m=0.08) is anything
