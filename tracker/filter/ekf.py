@@ -32,6 +32,7 @@ from tracker.state import State
 from tracker.types import Array, BallSighting, Reason, Rejected
 
 MAX_SUSPECTS = 8
+AS_LIKELY = 9.0  # more of a sum of squares: three sigma
 POSED = 3  # sightings that make a pose: one fits them whatever they show, and their shape tells no liar
 
 
@@ -143,18 +144,32 @@ def _without_liars(ahead: Prediction, batch: Batch, whole: Fit, rig: Rig, probab
 
 
 def _without_few(ahead: Prediction, batch: Batch, whole: Fit, rig: Rig, probability: float) -> Fit | None:
-    """Return the best fit without up to a third of the sightings, None when none fits."""
+    """Return the best fit without up to a third of the sightings, None when none fits.
+
+    Where two cameras contradict each other about one ball, and the rest hardly tells which lies, neither is believed.
+    """
     everyone = range(len(batch.sighted.sightings))
     suspects = np.argsort(-whole.gains())[:MAX_SUSPECTS].tolist()
     for count in range(1, min(len(everyone) // 3, len(everyone) - POSED - 1) + 1):
-        tried = [
-            fit(ahead, batch.part([i for i in everyone if i not in left_out]), rig)
-            for left_out in combinations(suspects, count)
-        ]
-        fitting = [one for one in tried if one is not None and _fits(one, probability)]
+        fitting = []
+        for left_out in combinations(suspects, count):
+            one = fit(ahead, batch.part([i for i in everyone if i not in left_out]), rig)
+            if one is not None and _fits(one, probability):
+                fitting.append((one.nis, left_out, one))
         if fitting:
-            return min(fitting, key=lambda one: one.nis)
+            nis, left_out, best = min(fitting, key=lambda each: each[0])
+            likely = [each for each_nis, each, _ in fitting if each_nis <= nis + AS_LIKELY]
+            neither = _neither(batch.sighted, left_out, likely)
+            return fit(ahead, batch.part([i for i in everyone if i not in neither]), rig) if neither else best
     return None
+
+
+def _neither(seen: Sighted, left_out: tuple[int, ...], likely: list[tuple[int, ...]]) -> set[int]:
+    """Return a sighting that was left out alone and others of its ball that may as likely be the liar; or none."""
+    if len(left_out) != 1:
+        return set()
+    rivals = {i for each in likely for i in each if seen.balls[i] == seen.balls[left_out[0]]}
+    return rivals if 1 < len(rivals) < len(seen.sightings) - POSED else set()
 
 
 def _splits_a_camera(seen: Sighted, kept: Sighted) -> bool:
