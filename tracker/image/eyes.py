@@ -12,7 +12,7 @@ from tracker.image.appearance import MISFIT_MAX, Appearance
 from tracker.image.behind import Behind
 from tracker.image.exposure import overexposed
 from tracker.image.hiding import never_seen, remember
-from tracker.image.look import Look, gaze_of, look_near
+from tracker.image.look import Gaze, Look, gaze_of, look_near
 from tracker.image.middle import Middle
 from tracker.image.mounting import Mounting
 from tracker.image.rivals import Rivals, first_rivals
@@ -135,23 +135,34 @@ class Eyes:
             self._sum_up()
 
     def _look_again(self, frames: Sequence[Frame], state: State, look: Look) -> None:
-        """Look at images without a ball in the light in which their camera last saw all; believe it if all are there.
+        """Look at images without a ball in the light in which their camera last saw all, or as if nothing were known.
 
-        What is before balls for a moment may be taken for another light, in which no ball is seen any more. Fewer than
-        all might be anything of their colours, and would leave the camera with a light that it does not have.
+        What is before balls for a moment may be taken for another light, or teach one, in which no ball is seen any
+        more. All balls must be there: fewer might be anything of their colours.
         """
         seen = [sighting.camera for sighting in look.sightings]
         for frame in frames:
             index, count = frame.camera, seen.count(frame.camera)
             if count == len(self._rig.marker):
                 self._proven[index] = self._tints[index].gains
-            elif count == 0 and self._proven[index].undoing != self._gazes[index].undoing:
+            elif count == 0:
                 gaze, gains = self._gazes[index], self._proven[index]
-                lit = {index: gaze.in_light(self._rig, gains)}
-                again = look_near([frame], self._rig, state, lit, self._mounting.things)
-                if len(again.sightings) == len(self._rig.marker):
+                if gains.undoing != gaze.undoing and self._sees_all(
+                    frame, state, gaze.in_light(self._rig, gains), look
+                ):
                     self._light_up(index, self._tints[index]._replace(gains=gains))
-                    look.replace(again)
+                elif self._sees_all(frame, state, gaze.at_such(Appearance()).in_light(self._rig, NEUTRAL), look):
+                    self._light_up(index, Tint())
+                    self._rivals[index] = first_rivals()
+                    self._sum_up()
+
+    def _sees_all(self, frame: Frame, state: State, gaze: Gaze, look: Look) -> bool:
+        """Say whether an image shows all balls to such a gaze, and take over what it gave if so."""
+        again = look_near([frame], self._rig, state, {frame.camera: gaze}, self._mounting.things)
+        found = len(again.sightings) == len(self._rig.marker)
+        if found:
+            look.replace(again)
+        return found
 
     def _may_draw(self, frames: Sequence[Frame]) -> int | None:
         """Return the camera that may draw a template: each that sees now in turn, and none in a lesson's round."""
