@@ -6,6 +6,7 @@ import pytest
 
 from tools.bench.trial import Trial, fly
 from tracker.scene import Lamp, Look
+from tracker.scene.random_look import random_look
 from tracker.sources.sim import SimTiming
 
 DIM = Look(
@@ -46,3 +47,10 @@ def test_a_lamp_that_hangs_near_is_known_at_every_place(look: Look) -> None:
     flown = fly(Trial("random-12", SimTiming(15.0, 5.0), look, seed=4))
     assert not flown.wrong()
     assert flown.between(1.5, 5.0).position_mm.mean() < 0.2
+
+
+def test_a_camera_whose_first_lessons_went_wrong_sees_again() -> None:
+    """Here one camera takes smeared balls for another light, in which it would see none for the rest of the flight."""
+    flown = fly(Trial("random-35", SimTiming(15.0, 2.4), random_look(35, 2.2), seed=35))
+    assert not flown.wrong()
+    assert flown.between(1.0, 2.4).position_mm.max() < 1.0
