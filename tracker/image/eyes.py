@@ -56,6 +56,10 @@ class Eyes:
             gaze_of(rig, Appearance(), album, room=behind.room)
             for album, behind in zip(self._albums, self._behind, strict=True)
         ]
+        self._first_gazes = [  # with templates of their own, so that those of balls as they are known stay
+            gaze_of(rig, Appearance(), Album(camera), room=behind.room)
+            for camera, behind in zip(rig.cameras, self._behind, strict=True)
+        ]
         self._middle = Middle()
         self._place_m = NOWHERE  # from there, where balls look as is known now
         self._turn = 0
@@ -146,12 +150,11 @@ class Eyes:
             if count == len(self._rig.marker):
                 self._proven[index] = self._tints[index].gains
             elif count == 0:
-                gaze, gains = self._gazes[index], self._proven[index]
-                if gains.undoing != gaze.undoing and self._sees_all(
-                    frame, state, gaze.in_light(self._rig, gains), look
-                ):
+                gains = self._proven[index]
+                proven = self._gazes[index].in_light(self._rig, gains)
+                if gains.undoing != self._gazes[index].undoing and self._sees_all(frame, state, proven, look):
                     self._light_up(index, self._tints[index]._replace(gains=gains))
-                elif self._sees_all(frame, state, gaze.at_such(Appearance()).in_light(self._rig, NEUTRAL), look):
+                elif self._sees_all(frame, state, self._first_gazes[index], look):
                     self._light_up(index, Tint())
                     self._rivals[index] = first_rivals()
                     self._sum_up()
