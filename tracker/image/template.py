@@ -48,10 +48,11 @@ class Shades:
     weights: tuple[tuple[float, ...], ...]
 
 
+TO_CAMERA: Vector = (0.0, 0.0, 1.0)
 _UNITS = tuple(tuple(float(i == j) for j in range(TERMS + 1)) for i in range(TERMS + 1))
-FLAT = Shades((0.0, 0.0, 1.0), _UNITS[:4])
+FLAT = Shades(TO_CAMERA, _UNITS[:4])
 """A matt ball under light not known: even, and linear in the normal."""
-EVERY_TERM = Shades((0.0, 0.0, 1.0), _UNITS[:TERMS])
+EVERY_TERM = Shades(TO_CAMERA, _UNITS[:TERMS])
 """Its shapes are the matt terms themselves."""
 
 
@@ -117,45 +118,42 @@ def _surface_along(
         gloss[i] = mirrored
 
 
-@compiled("f4[:, :, ::1](i8, f8, i8, f4[::1], f4[:, ::1])")
+@compiled("f4[:, ::1](i8, f8, i8, f4[::1], f4[::1])")
 def _sharp(
     per_px: int, radius_px: float, count: int, lamp: NDArray[np.float32], weights: NDArray[np.float32]
 ) -> NDArray[np.float32]:
-    """Return the shapes before lens and pixel, sharp but for the grid's step: (size, size, p), size = 2 count + 1."""
+    """Return a shape before lens and pixel, sharp but for the grid's step: (size, size), size = 2 count + 1."""
     size, step = 2 * count + 1, np.float32(1.0 / (per_px * radius_px))
-    shapes = np.zeros((size, size, len(weights)), np.float32)
+    shape = np.zeros((size, size), np.float32)
     half = lamp + np.array([0.0, 0.0, 1.0], np.float32)
     half /= max(np.sqrt((half * half).sum()), np.float32(1e-3))
     rim = min(count, int(np.ceil(radius_px * per_px)) + 1)
     width = 2 * rim + 1
     normals, rows = np.empty((3, width), np.float32), np.empty((3, width), np.float32)
     gloss, disc, line = rows[0], rows[1], rows[2]
+    line[:] = weights[0]
+    uneven, shine = weights[1:GLOSS].any(), weights[GLOSS]
     for row in range(count - rim, count + rim + 1):
         _surface_along(np.float32(row - count) * step, step, np.float32(-rim) * step, half, normals, gloss, disc)
-        for k in range(len(weights)):
-            if weights[k, 1:GLOSS].any():
-                lit(weights[k, :GLOSS], normals, line)
-            else:
-                line[:] = weights[k, 0]
-            shine = weights[k, GLOSS]
-            for i in range(width):
-                shapes[row, count - rim + i, k] = (line[i] + shine * gloss[i]) * disc[i]
-    return shapes
+        if uneven:
+            lit(weights[:GLOSS], normals, line)
+        for i in range(width):
+            shape[row, count - rim + i] = (line[i] + shine * gloss[i]) * disc[i]
+    return shape
 
 
-@compiled("f4[:, :, ::1](f4[:, :, ::1])")
+@compiled("f4[:, ::1](f4[:, ::1])")
 def _thinned(fine: NDArray[np.float32]) -> NDArray[np.float32]:
     """Return every other sample of a picture of odd size about its middle, each with a share of its neighbours."""
-    middle, shapes = len(fine) // 2, fine.shape[2]
+    middle = len(fine) // 2
     count = (middle - 1) // 2
-    coarse = np.zeros((2 * count + 1, 2 * count + 1, shapes), np.float32)
+    coarse = np.zeros((2 * count + 1, 2 * count + 1), np.float32)
     for row in range(2 * count + 1):
         for column in range(2 * count + 1):
             r, c = middle + 2 * (row - count), middle + 2 * (column - count)
-            for k in range(shapes):
-                sides = fine[r - 1, c, k] + fine[r + 1, c, k] + fine[r, c - 1, k] + fine[r, c + 1, k]
-                corners = fine[r - 1, c - 1, k] + fine[r - 1, c + 1, k] + fine[r + 1, c - 1, k] + fine[r + 1, c + 1, k]
-                coarse[row, column, k] = 0.25 * fine[r, c, k] + 0.125 * sides + 0.0625 * corners
+            sides = fine[r - 1, c] + fine[r + 1, c] + fine[r, c - 1] + fine[r, c + 1]
+            corners = fine[r - 1, c - 1] + fine[r - 1, c + 1] + fine[r + 1, c - 1] + fine[r + 1, c + 1]
+            coarse[row, column] = 0.25 * fine[r, c] + 0.125 * sides + 0.0625 * corners
     return coarse
 
 
@@ -180,16 +178,33 @@ def draw(radius_steps: int, blur_steps: int, box_px: int, per_px: int, shades: S
     Beside a grid of 32 per pixel, 8 are wrong by 0.5 % of the contrast at most, 4 by 1 % when colour is kept by blocks;
     either moves a centre by less than 0.001 px.
     """
+    variance = variance_of(blur_steps * BLUR_STEP_PX, box_px)
+    if per_px < sampling_of(radius_steps * RADIUS_STEP_PX, box_px):
+        variance += 0.5 / (2 * per_px) ** 2  # of a sample with a quarter on either side
+    size, shapes = (radius_steps, blur_steps, box_px, per_px), []
+    for weights in shades.weights:
+        lamp = shades.lamp if weights[GLOSS] else TO_CAMERA
+        shapes.append((_kept_shape if weights in _UNITS else _shape)(*size, lamp, weights))
+    fine = cv2.merge(shapes).astype(np.float32, copy=False)
+    fine = fine.reshape(*shapes[0].shape, len(shapes))  # OpenCV drops a single channel's axis
+    fine.flags.writeable = False
+    return Template(fine, np.array((per_px, radius_steps * RADIUS_STEP_PX, variance)))
+
+
+def _shape(
+    radius_steps: int, blur_steps: int, box_px: int, per_px: int, lamp: Vector, weights: tuple[float, ...]
+) -> NDArray[np.float32]:
+    """Draw one shape (size, size); arguments as for `draw`, its lamp and its weights alone."""
     radius_px, kernel = radius_steps * RADIUS_STEP_PX, _kernel(per_px, blur_steps, box_px)
     count = math.ceil(radius_px * per_px) + len(kernel) // 2 + 2
-    form = np.array(shades.lamp, np.float32), np.array(shades.weights, np.float32)
-    variance = variance_of(blur_steps * BLUR_STEP_PX, box_px)
+    form = np.array(lamp, np.float32), np.array(weights, np.float32)
     if per_px < sampling_of(radius_px, box_px):
         sharp = _thinned(_sharp(2 * per_px, radius_px, 2 * count + 1, *form))
-        variance += 0.5 / (2 * per_px) ** 2  # of a sample with a quarter on either side
     else:
         sharp = _sharp(per_px, radius_px, count, *form)
     blurred = cv2.sepFilter2D(sharp, -1, kernel, kernel, borderType=cv2.BORDER_CONSTANT)
-    fine = blurred.astype(np.float32, copy=False).reshape(sharp.shape)  # OpenCV drops a single channel's axis
-    fine.flags.writeable = False
-    return Template(fine, np.array((per_px, radius_px, variance)))
+    return blurred.astype(np.float32, copy=False)
+
+
+_kept_shape = lru_cache(maxsize=DRAWN)(_shape)
+"""Of a single term: other light leaves it as it is."""
