@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
@@ -21,6 +21,7 @@ BEARING_STEP_RAD = 0.07  # rays closer than this share a ball's shading
 PUBLISH_AT = (3, 6, 9, 12, 15, 18, 27)  # balls learned when templates follow the light; then, as long as
 PUBLISH_SOON, MANY, PUBLISH_LATE = 9, 144, 36  # they are not many, every so many, and later every so many
 LEAST_CHANGE = 0.02  # of many balls' light: one lamp's, it moves the centre of a 3 px ball by a third of light's doubt
+KEPT = 8  # lights
 BLUR_STEP_PX, FIRST_STEP_PX = 0.03, 0.15
 DETAIL_SHARE = 0.05  # of the newest ball in what is known of the camera's colour detail
 MISFIT_MAX = 2.0  # an image that fits no ball teaches nothing
@@ -33,11 +34,13 @@ class Appearance:
     response: the camera's.
     light: learned.  shown: the light that templates are drawn by; it follows `light` in few, growing steps, and once
         many balls were learned only where it has changed.
+    earlier: lights shown before, the newest first: whoever comes back to a place finds the templates drawn there.
     """
 
     response: Response = field(default_factory=Response)
     light: Light = field(default_factory=Light)
     shown: Light = field(default_factory=Light)
+    earlier: tuple[Light, ...] = ()
 
     def shades(self, camera: Camera, x: float, y: float) -> Shades:
         """Return how a ball is shaded that the camera sees along the ray (x, y, 1)."""
@@ -63,10 +66,10 @@ class Appearance:
 
     def at(self, place_m: Array) -> Appearance:
         """Return it at a place (3,) from the room's middle in W [m]; the same where the light is hardly another."""
-        if not self.shown.count:
+        light, shown = self.light, self.shown
+        if not shown.count or (light.count > MANY and light.apart_at(place_m, shown) <= LEAST_CHANGE):
             return self
-        shown = to_show(self.light.at(place_m), self.shown)
-        return self if shown is self.shown else replace(self, shown=shown)
+        return self._showing(light.at(place_m))
 
     def recentred(self, shift_m: Array) -> Appearance:
         """Return it about another middle of the room, shift_m (3,) from the one before in W."""
@@ -100,9 +103,17 @@ class Appearance:
         R_RtoW = ray_frame(*_ray(ball, camera), camera.R_CtoW)
         light = self.light.learned(*light_on(sample, self.light.lamp_seen(R_RtoW)), R_RtoW, place_m)
         if not (light.trusted and _due(light.count)):
-            return Appearance(response, light, self.shown)
+            return replace(self, response=response, light=light)
         light = light.solved(others, place_m)
-        return Appearance(response, light, to_show(light, self.shown))
+        return replace(self, response=response, light=light)._showing(light)
+
+    def _showing(self, light: Light) -> Appearance:
+        """Return it with templates drawn by a light, or by one shown now or before that is hardly another."""
+        shown, before = to_show(light, (self.shown, *self.earlier)), self.shown
+        if shown is before:
+            return self
+        earlier = (before, *(each for each in self.earlier if each is not shown))[:KEPT]
+        return replace(self, shown=shown, earlier=earlier if light.count > MANY else ())
 
 
 def _due(balls: int) -> bool:
@@ -111,9 +122,17 @@ def _due(balls: int) -> bool:
     return balls in PUBLISH_AT or (balls > PUBLISH_AT[-1] and balls % every == 0)
 
 
-def to_show(light: Light, shown: Light) -> Light:
-    """Return the light to draw templates by: what is shown stays where the light of many balls has hardly changed."""
-    return light if light.count <= MANY or light.apart_from(shown) > LEAST_CHANGE else shown
+def to_show(light: Light, known: Sequence[Light]) -> Light:
+    """Return the light to draw templates by: where it is of many balls, one that was shown and is hardly another.
+
+    known: the light shown now, which stays if it may, then those before.
+    """
+    if light.count <= MANY:
+        return light
+    if light.apart_from(known[0]) <= LEAST_CHANGE:
+        return known[0]
+    nearest = min(known, key=light.apart_from)
+    return nearest if light.apart_from(nearest) <= LEAST_CHANGE else light
 
 
 def _ray(ball: Expected, camera: Camera) -> tuple[float, float]:

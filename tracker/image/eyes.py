@@ -135,8 +135,9 @@ class Eyes:
         place_m = self._middle.place(state.p_BinW)
         if not math.dist(place_m, self._place_m) <= PLACE_STEP_M:
             self._place_m = place_m
-            self._rivals = [rivals.at(place_m) for rivals in self._rivals]
-            self._sum_up()
+            before, self._rivals = self._rivals, [rivals.at(place_m) for rivals in self._rivals]
+            if any(now is not then for now, then in zip(self._rivals, before, strict=True)):
+                self._sum_up()
 
     def _look_again(self, frames: Sequence[Frame], state: State, look: Look) -> None:
         """Look at images without a ball in the light in which their camera last saw all, or as if nothing were known.

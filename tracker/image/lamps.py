@@ -8,12 +8,14 @@ vehicle that flies about from other sides, as its distance demands: nothing else
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.optimize import nnls
 
 from tracker.image.harmonics import LAMBERT, TERMS, terms_at
+from tracker.maths.compiled import compiled
 from tracker.maths.sphere import spread
 from tracker.types import Array
 
@@ -70,12 +72,7 @@ class RoomLight:
 
     def terms_at(self, place_m: Array) -> Array:
         """Return the terms (TERMS,) at a place (3,) from the middle in W [m]."""
-        terms, grown = self.terms[:TERMS].copy(), within(place_m) @ self.terms[TERMS:].reshape(3, MOVING)
-        if terms[0] + grown[0] < _DIMMEST:  # a straight line leads to no light, which there is none without
-            grown *= (terms[0] - _DIMMEST) / -grown[0]
-        terms[:MOVING] += grown
-        terms /= terms[0]
-        return terms
+        return _terms_at(self.terms, place_m)
 
     def lamp_at(self, place_m: Array) -> Array:
         """Return the unit vector (3,) from there to the brightest lamp."""
@@ -87,6 +84,24 @@ class RoomLight:
         """Return the same light about another middle, shift_m (3,) from the one before in W."""
         terms = about(-shift_m) @ self.terms
         return RoomLight(terms / max(terms[0], _DIMMEST), self.lamp_at(shift_m), self.nearness, self.differs)
+
+
+@compiled("f8[::1](Array(f8, 1, 'C', True), Array(f8, 1, 'C', True))")
+def _terms_at(room: Array, place_m: Array) -> Array:
+    """Return the terms (TERMS,) of a room's light (ROOM_TERMS,) at a place (3,) from its middle in W [m]."""
+    away_m = math.sqrt(place_m[0] ** 2 + place_m[1] ** 2 + place_m[2] ** 2)
+    share, grown, terms = 1.0 if away_m <= FARTHEST_M else FARTHEST_M / away_m, np.zeros(MOVING), room[:TERMS].copy()
+    for k in range(3):
+        for i in range(MOVING):
+            grown[i] += share * place_m[k] * room[TERMS + MOVING * k + i]
+    if terms[0] + grown[0] < _DIMMEST:  # a straight line leads to no light, which there is none without
+        grown *= (terms[0] - _DIMMEST) / -grown[0]
+    for i in range(MOVING):
+        terms[i] += grown[i]
+    even = terms[0]
+    for i in range(TERMS):
+        terms[i] /= even
+    return terms
 
 
 def about(shift_m: Array) -> Array:

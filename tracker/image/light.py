@@ -59,6 +59,10 @@ class Light:
         """Return it at a place (3,) from the room's middle in W [m]."""
         return replace(self, lamp=self.room.lamp_at(place_m), terms=self.room.terms_at(place_m))
 
+    def apart_at(self, place_m: Array, other: Light) -> float:
+        """Return by how much it is apart from another at a place (3,) from the room's middle in W [m]."""
+        return _apart(self.room.terms_at(place_m), other.terms)
+
     def recentred(self, shift_m: Array) -> Light:
         """Return the same light about another middle of the room, shift_m (3,) from the one before in W."""
         by = about(shift_m)
@@ -97,8 +101,7 @@ class Light:
 
         Source: the harmonics are orthogonal, and the mean square of each is that of Lambert's factor.
         """
-        apart: float = np.linalg.norm(LAMBERT * (self.terms - other.terms)).item()
-        return apart
+        return _apart(self.terms, other.terms)
 
     def faded(self) -> Light:
         """Return the same light, less sure of it."""
@@ -113,6 +116,14 @@ class Light:
         """Return the shapes of a ball seen along a ray: coverage, that times the light, the lamp's mirror image."""
         matt = (*_rounded(turned(R_RtoW).T @ self.terms, STEPS), 0.0)
         return Shades(self.lamp_seen(R_RtoW), (COVERAGE, matt, MIRROR))
+
+
+@compiled("f8(Array(f8, 1, 'C', True), Array(f8, 1, 'C', True))")
+def _apart(one: Array, other: Array) -> float:
+    total = 0.0
+    for i in range(TERMS):
+        total += (LAMBERT[i] * (one[i] - other[i])) ** 2
+    return math.sqrt(total)
 
 
 def _rounded(values: Array, steps: int) -> list[float]:
