@@ -18,14 +18,14 @@ from tracker.rig import Rig
 from tracker.state import State
 from tracker.types import Array
 
-LIGHT_PX = 0.03  # one sigma that light learned from balls leaves: 0.02 where one lamp makes it, 0.04 where several do
+LIGHT_PX = 0.008  # one sigma that learned light leaves however clearly balls show; more by `tracker.image.clarity`
 STREAK_SHARE = 0.01  # of the streak: what it leaves
 
 
 def shared_covariance(state: State, rig: Rig, exposure_s: float, doubts_px: Array) -> Array:
     """Return the covariance (3, 3) of the position by errors that all balls of a camera share [m^2].
 
-    doubts_px: (cameras,) one sigma of what a camera's gamma, not quite known, and a knock leave [px].
+    doubts_px: (cameras,) one sigma of what a camera's light and gamma, not quite known, and a knock leave [px].
     Source: a shift of all images by noise of one sigma s in each camera is a measurement of the position with slope
         f / d (I - u u'), u the ray, d the distance; so the covariance is (sum (f / d s)^2 (I - u u'))^-1. s grows with
         the streak f / d |(I - u u') v| exposure, and with the doubts.

@@ -20,7 +20,7 @@ def reported(state: State, rig: Rig, exposure_s: float, doubts_px: Array, moved_
 
     Args:
         exposure_s: of the slowest shutter.
-        doubts_px, moved_px: (cameras,) one sigma of what a camera's gamma, not quite known, and a knock leave [px].
+        doubts_px, moved_px: (cameras,) one sigma of what light and gamma, not quite known, and a knock leave [px].
     Returns:
         (12, 12) [m, rad, m/s, rad/s], that of `shared_covariance` and `sag_covariance` included, and (cameras,) [s].
     """

@@ -20,7 +20,7 @@ from tracker.types import Array, Image
 BEARING_STEP_RAD = 0.07  # rays closer than this share a ball's shading
 PUBLISH_AT = (3, 6, 9, 12, 15, 18, 27)  # balls learned when templates follow the light; then, as long as
 PUBLISH_SOON, MANY, PUBLISH_LATE = 9, 144, 36  # they are not many, every so many, and later every so many
-LEAST_CHANGE = 0.02  # of many balls' light: one lamp's, it moves the centre of a 3 px ball by a third of light's doubt
+LEAST_CHANGE = 0.02  # of many balls' light: one lamp's, it moves the centre of a 3 px ball by 0.01 px
 KEPT = 8  # lights
 BLUR_STEP_PX, FIRST_STEP_PX = 0.03, 0.15
 DETAIL_SHARE = 0.05  # of the newest ball in what is known of the camera's colour detail

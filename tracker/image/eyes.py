@@ -10,6 +10,7 @@ import numpy as np
 from tracker.image.album import Album
 from tracker.image.appearance import MISFIT_MAX, Appearance
 from tracker.image.behind import Behind
+from tracker.image.clarity import Clarity
 from tracker.image.exposure import overexposed
 from tracker.image.hiding import never_seen, remember
 from tracker.image.look import Gaze, Look, gaze_of, look_near
@@ -51,7 +52,7 @@ class Eyes:
         self._tints = [Tint() for _ in rig.cameras]
         self._proven = [NEUTRAL for _ in rig.cameras]  # the light in which all balls were seen last
         self._mounting = Mounting(rig.marker)
-        self._surprise = Surprise(len(rig.cameras))
+        self._surprise, self._clarity = Surprise(len(rig.cameras)), Clarity(len(rig.cameras))
         self._gazes = [
             gaze_of(rig, Appearance(), album, room=behind.room)
             for album, behind in zip(self._albums, self._behind, strict=True)
@@ -78,7 +79,7 @@ class Eyes:
         self._exposures_s = tuple([appearance.response.exposure_s for appearance in appearances])
         self.exposure_s = max(self._exposures_s)
         self._lessons_due = max(rivals.lessons_due for rivals in self._rivals)
-        self.doubts_px = np.array([rivals.doubt_px for rivals in self._rivals])
+        self.doubts_px = np.hypot([rivals.doubt_px for rivals in self._rivals], self._clarity.light_px)
         awake = [each for each, at in zip(self._rivals, self._seen_at, strict=True) if self._turn - at <= AWAY_ROUNDS]
         self._gamma_known = all(rivals.settled or rivals.by_room for rivals in awake)  # if not for the last time
         enough = all(rivals.count >= LEARN_ALL or rivals.has_seen(LEARN_ALL) for rivals in awake)
@@ -194,13 +195,16 @@ class Eyes:
             if any(look.fitted(one).streak_px > LONG_STREAK_PX for one in seen):
                 self._begin_anew([first_rivals() for _ in self._rig.cameras])
         self._taught_blindly |= blindly and not self._gamma_known
+        teachers = seen
         if self._settled:
             every = min(self._every, LEARN_SOON) if self._surprise.is_some else self._every
             if self._turn % every:
                 return
-            seen = [seen[self._turn // every % len(seen)]]
+            teachers = [seen[self._turn // every % len(seen)]]
+        for index in look.glances:
+            self._clarity.take(index, [one.cov_px.trace().item() / 2.0 for one in seen if one.camera == index])
         place_m = self._placed(state)
-        for sighting in seen:
+        for sighting in teachers:
             one, index = look.fitted(sighting), sighting.camera
             camera, image = self._rig.cameras[index], one.frame.image
             expected = one.expected(camera, self._behind[index].room)

@@ -25,7 +25,7 @@ from tracker.types import Array, Image
 GAMMAS = (1.0, 1.6, 2.2)
 MOST_GAMMA, BEYOND = 2.8, 0.3  # where the outermost is the best, rivals this far on either side of it are next
 APART = 0.6  # as far on either side of a gamma found lie those that it is tried against once the room is known
-SEARCHING = 0.3  # one sigma of a gamma while rivals differ little
+SEARCHING = 0.17  # one sigma of a gamma while it is looked for: it lies nearest to this rival, they are 0.6 apart
 LEAST_DOUBT, MOST_DOUBT = 0.08, 1.0  # of a gamma found
 LEAST_AT_THE_END = 0.04  # of 1, where the range ends
 UNLIT_PX = 0.12  # what all centres may be wrong by together while the light is not known
