@@ -121,12 +121,14 @@ def _borne_out(ahead: Prediction, near: Batch, seen: Sighted, rig: Rig, probabil
     """Say whether what the gate lets pass is to be believed where it shuts others out.
 
     More than a pose needs, of every camera, bear each other out by the marker's shape. Others must be what the track
-    expected, and no fewer than were shut out.
+    expected, and no fewer than were shut out; one against one, nobody can tell.
     """
     kept = near.sighted
     if len(kept.sightings) > POSED and set(kept.cameras.tolist()) == set(seen.cameras.tolist()):
         return True
-    return 2 * len(kept.sightings) >= len(seen.sightings) and _expected(ahead, near, rig, probability)
+    if len(kept.sightings) < max(2, len(seen.sightings) / 2):
+        return False
+    return _expected(ahead, near, rig, probability)
 
 
 def _expected(ahead: Prediction, batch: Batch, rig: Rig, probability: float) -> bool:

@@ -52,7 +52,9 @@ class Appearance:
         """Return it under another gamma, its light ready to be learned anew."""
         if gamma == self.response.gamma:
             return self
-        return replace(self, response=replace(self.response, gamma=gamma), light=self.light.faded())
+        power = gamma / self.response.gamma
+        light, shown = self.light.taken_to(power), self.shown.taken_to(power)
+        return replace(self, response=replace(self.response, gamma=gamma), light=light, shown=shown)
 
     def in_other_light(self) -> Appearance:
         """Return it with the light to be learned from nothing."""

@@ -44,7 +44,7 @@ def numbers_of(ball: Expected) -> Array:
     """Return what is known of a ball as compiled code takes it, see `reading.BALL_SIZE`."""
     r = ball.response
     variances = variance_of(r.luma_px, 1), variance_of(r.chroma_px, r.block_px)
-    return np.array((ball.radius_px, *variances, *ball.streak_px))
+    return np.array((ball.radius_px, *variances, *ball.streak_px, *ball.longer))
 
 
 def templates_of(ball: Expected) -> tuple[Template, Template]:

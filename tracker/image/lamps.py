@@ -34,6 +34,9 @@ ONE = 1e3  # how firmly the even light is held to 1, beside what is learned
 BEAM = 0.9  # lamps closer to the brightest than that, by the cosine, are one with it
 _STEP_M = 0.4  # over which a near lamp's growth is taken: as far as a vehicle usually goes
 _DIMMEST = 0.25  # of the middle's light
+_DARKEST = 0.02  # of the even light: harmonics fall below what there is
+_AROUND = terms_at(DIRECTIONS)
+_BACK, _FIRST_BACK = np.linalg.pinv(_AROUND.T), np.linalg.pinv(_AROUND[:MOVING].T)
 
 
 def _lamps(nearness: float) -> Array:
@@ -84,6 +87,23 @@ class RoomLight:
         """Return the same light about another middle, shift_m (3,) from the one before in W."""
         terms = about(-shift_m) @ self.terms
         return RoomLight(terms / max(terms[0], _DIMMEST), self.lamp_at(shift_m), self.nearness, self.differs)
+
+    def taken_to(self, power: float) -> RoomLight:
+        """Return all light taken to a power: what grows, grows by its slope."""
+        light, grown = _AROUND.T @ self.terms[:TERMS], self.terms[TERMS:].reshape(3, MOVING) @ _AROUND[:MOVING]
+        slope = power * np.maximum(light, _DIMMEST) ** (power - 1.0)
+        terms = np.concatenate((_BACK @ _power(light, power), (slope * grown @ _FIRST_BACK.T).ravel()))
+        return RoomLight(terms / terms[0], self.lamp, self.nearness, self.differs)
+
+
+def raised(terms: Array, power: float) -> Array:
+    """Return the terms (TERMS,) of light taken to a power, the even light 1."""
+    after = _BACK @ _power(_AROUND.T @ terms, power)
+    return np.asarray(after / after[0])
+
+
+def _power(light: Array, power: float) -> Array:
+    return np.asarray(np.maximum(light, _DARKEST) ** power)
 
 
 @compiled("f8[::1](Array(f8, 1, 'C', True), Array(f8, 1, 'C', True))")

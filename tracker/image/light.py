@@ -16,7 +16,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from tracker.image.harmonics import LAMBERT, TERMS, turned
-from tracker.image.lamps import MOVING, ROOM_TERMS, RoomLight, about, explained, within
+from tracker.image.lamps import MOVING, ROOM_TERMS, RoomLight, about, explained, raised, within
 from tracker.image.template import GLOSS, Shades, Vector
 from tracker.maths.compiled import compiled
 from tracker.maths.covariance import propagated
@@ -103,9 +103,11 @@ class Light:
         """
         return _apart(self.terms, other.terms)
 
-    def faded(self) -> Light:
-        """Return the same light, less sure of it."""
-        return replace(self, information=FADED * self.information, target=FADED * self.target)
+    def taken_to(self, power: float) -> Light:
+        """Return it as another gamma shows it, which takes all light to a power, and less sure of it."""
+        room, terms = self.room.taken_to(power), raised(self.terms, power)
+        target = self.target + self.information @ (room.terms - self.room.terms)
+        return replace(self, room=room, terms=terms, information=FADED * self.information, target=FADED * target)
 
     def lamp_seen(self, R_RtoW: Array) -> Vector:
         """Return the brightest lamp's direction in a ray's frame, rounded."""

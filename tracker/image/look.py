@@ -20,10 +20,22 @@ from tracker.image.detect import Blob, find_blobs
 from tracker.image.hiding import never_seen
 from tracker.image.mounting import things_seen
 from tracker.image.patch import Expected
-from tracker.image.sight import COV, MISFIT, SHOWN, SIZE, SPOT, UV, Known, find_ball, known_of, read_ahead
+from tracker.image.sight import CENTRE, COV, MISFIT, SHOWN, SIZE, SPOT, UV, Known, find_ball, known_of, read_ahead
 from tracker.image.template import Template
 from tracker.image.tint import NEUTRAL, Gains
-from tracker.image.view import DEPTH, RADIUS, RAY_X, RAY_Y, SPEED_U, SPEED_V, U, V, expected_views
+from tracker.image.view import (
+    DEPTH,
+    LONGER_U,
+    LONGER_UV,
+    RADIUS,
+    RAY_X,
+    RAY_Y,
+    SPEED_U,
+    SPEED_V,
+    U,
+    V,
+    expected_views,
+)
 from tracker.rig import Rig
 from tracker.state import State
 from tracker.types import Array, BallSighting, Frame, Reason, Rejected, frozen_array
@@ -52,7 +64,8 @@ class Fitted(NamedTuple):
         ray, speed_px_s = (view[RAY_X], view[RAY_Y]), (view[SPEED_U], view[SPEED_V])
         shades = self.appearance.shades(camera, *ray)
         response = self.appearance.response
-        return Expected((u, v), view[RADIUS], speed_px_s, shades, response, self.drawn, ray, room, self.held)
+        longer = view[LONGER_U], view[LONGER_UV]
+        return Expected((u, v), view[RADIUS], speed_px_s, shades, response, self.drawn, ray, room, self.held, longer)
 
     @property
     def streak_px(self) -> float:
@@ -182,7 +195,7 @@ def _find_balls(frame: Frame, rig: Rig, state: State, gaze: Gaze, things: Array,
     fixed = fits.view()
     fixed.flags.writeable = False
     look.glances[camera] = Glance(frame, views, fixed, appearance, drawn, held)
-    uvs_px, covs_px2 = fixed[:, UV], fixed[:, COV].reshape(-1, 2, 2)
+    uvs_px, covs_px2 = fixed[:, CENTRE], fixed[:, COV].reshape(-1, 2, 2)
     for b, view in enumerate(views):
         if not (math.isfinite(view[U] + view[V]) and view[DEPTH] >= NEAREST_M):
             drawn.append(None)

@@ -83,7 +83,7 @@ class Expected:
     speed_px_s: how fast its image moves.  shades: see `template.Shades`.  response: its camera's.
     drawn: templates of its brightness and its colour that serve for it; None for those of its own.
     ray: (x, y, 1) leads to it from the camera; None where uv_px must tell.  room: what is known to stand behind.
-    held (any, 3): what holds it, see `holder.EXCESS`.
+    held (any, 3): what holds it, see `holder.EXCESS`.  longer: how oval it is, LONGER_U and LONGER_UV of `outline`.
     """
 
     uv_px: tuple[float, float]
@@ -95,6 +95,7 @@ class Expected:
     ray: tuple[float, float] | None = None
     room: Room = NO_ROOM
     held: Array = field(default_factory=lambda: NOT_HELD)
+    longer: tuple[float, float] = (0.0, 0.0)
 
     @property
     def streak_px(self) -> Streak:

@@ -11,9 +11,9 @@ from tracker.image.template import STREAK_MAX_PX
 from tracker.maths.compiled import compiled
 from tracker.types import Array
 
-RADIUS, LUMA_VAR, CHROMA_VAR, STREAK_U, STREAK_V, BALL_SIZE = range(6)
-"""What compiled code knows of a ball: radius [px], variances of its blurs, see `template.variance_of` [px^2], and how
-far its image moves during the exposure [px]."""
+RADIUS, LUMA_VAR, CHROMA_VAR, STREAK_U, STREAK_V, LONGER_U, LONGER_UV, BALL_SIZE = range(8)
+"""What compiled code knows of a ball: radius [px], variances of its blurs, see `template.variance_of` [px^2], how
+far its image moves during the exposure [px], and how oval it is, see `outline.RADIUS`."""
 
 
 @compiled("Tuple((i8, f8))(f8, f8)")
@@ -80,7 +80,10 @@ def read(
     What the ball is off from the one drawn, and its centre from the grid, is put right to the second order. A ball
     larger by a share s / (1 - s) is the drawn one blown up: I(x) = J(x - d) with d = s x, and in one direction
     J(x - d) = J - d J' + d^2 J'' / 2, where r^2 J'' = r^2 lap J - r J' for a round picture. Blown up, its blur is too;
-    what it then lacks of the variance acts by the heat equation, dI / d variance = lap I / 2.
+    what it then lacks of the variance acts by the heat equation, dI / d variance = lap I / 2. An oval ball is a round
+    one pulled by exp(e), e without trace: d = s x + (1 - s) (e x - e^2 x / 2). The square of what of d leads outwards
+    acts by J'' / 2, of what leads across by J' / 2r. What is of the second order and differs by direction, which shows
+    at the limb alone, is that of the limb.
     """
     per_px, share = made[0], (ball[RADIUS] - made[1]) / ball[RADIUS]
     lacking = ball[variance] - made[2] * (ball[RADIUS] / made[1]) ** 2
@@ -91,7 +94,10 @@ def read(
     sums = np.empty((5, len(value), n), np.float32)
     mean = 1.0 / _gather(fine, u_steps, v_steps, per_px, ball, pixels, sums)
     slope, curve = 0.5 * mean * per_px, 0.5 * mean * per_px * per_px
-    first, second = share + 0.5 * share * share, share * share
+    longer, aslant = (1.0 - share) * ball[LONGER_U], (1.0 - share) * ball[LONGER_UV]
+    oval = longer * longer + aslant * aslant
+    blown = share - 0.5 * (1.0 - share) * (ball[LONGER_U] ** 2 + ball[LONGER_UV] ** 2)
+    first, second, limb = blown + 0.5 * (blown * blown - oval), blown * blown, 1.0 / (ball[RADIUS] * ball[RADIUS])
     for p in range(len(value)):
         for i in range(n):
             x, y = pixels[0, i] - u, pixels[1, i] - v
@@ -99,5 +105,10 @@ def read(
             around = sums[1, p, i] + sums[2, p, i] + sums[3, p, i] + sums[4, p, i]
             half = curve * (around - np.float32(4.0) * sums[0, p, i])
             by_u[p, i], by_v[p, i], bend[p, i] = du, dv, half
-            moved = (first * x + off_u) * du + (first * y + off_v) * dv
-            value[p, i] = mean * sums[0, p, i] + moved + (second * (x * x + y * y) + lacking) * half
+            pulled = longer * (x * x - y * y) + 2.0 * aslant * x * y
+            outwards = limb * pulled
+            by_size = first + outwards * (blown + outwards)
+            moved_u, moved_v = (by_size + longer) * x + aslant * y, (by_size - longer) * y + aslant * x
+            moved = (moved_u + off_u) * du + (moved_v + off_v) * dv
+            bent = second * (x * x + y * y) + pulled * (2.0 * blown + outwards) + lacking
+            value[p, i] = mean * sums[0, p, i] + moved + bent * half

@@ -16,10 +16,12 @@ from tracker.image.holder import distrust
 from tracker.image.newton import EVIDENCE, FIT_SIZE, SHARES, gauss_newton
 from tracker.image.patch import Response, cut_pixels, light_of, trust_of
 from tracker.image.reading import BALL_SIZE, CHROMA_VAR, LUMA_VAR, STREAK_U, STREAK_V
+from tracker.image.reading import LONGER_U as BALL_LONGER_U
+from tracker.image.reading import LONGER_UV as BALL_LONGER_UV
 from tracker.image.reading import RADIUS as BALL_RADIUS
 from tracker.image.spots import WIDE_PX, find_spots
 from tracker.image.template import MARGIN_PX, STREAK_MAX_PX, Template, variance_of
-from tracker.image.view import RADIUS, S_UU, S_UV, S_VV, SPEED_U, SPEED_V, U, V
+from tracker.image.view import LONGER_U, LONGER_UV, RADIUS, S_UU, S_UV, S_VV, SHIFT_U, SHIFT_V, SPEED_U, SPEED_V, U, V
 from tracker.maths.compiled import compiled
 from tracker.types import Array, Image, Reason
 
@@ -27,10 +29,10 @@ REGION_SIGMA = 3.5
 REGION_MARGIN_PX = 3.0
 LINE_BYTES = 64  # what memory sends at a time
 LEAST_AREA_SHARE, MOST_AREA_SHARE = 0.15, 4.0  # of the ball's expected disc
-UV, COV, MISFIT, SPOT, SHOWN, SIZE = slice(0, 2), slice(2, 6), 6, slice(7, 9), slice(9, 12), 12
-"""What a fit gives: the centre [px], its covariance (uu, uv, vu, vv) [px^2], chi2 per degree of freedom, the
-coloured spot's middle [px], and how much of the ball is there, see `hiding.SHOWN`."""
-_MISFIT, _SPOT_U, _SPOT_V, _SHOWN = 6, 7, 8, 9
+UV, COV, MISFIT, SPOT, SHOWN, CENTRE, SIZE = slice(0, 2), slice(2, 6), 6, slice(7, 9), slice(9, 12), slice(12, 14), 14
+"""What a fit gives: the middle of its image [px], its covariance (uu, uv, vu, vv) [px^2], chi2 per degree of freedom,
+the coloured spot's middle [px], how much of it is there, see `hiding.SHOWN`, and where its centre is projected [px]."""
+_MISFIT, _SPOT_U, _SPOT_V, _SHOWN, _CENTRE_U, _CENTRE_V = 6, 7, 8, 9, 12, 13
 _FOUND, _NO_COLOUR, _OUT_OF_VIEW, _CUT_OFF, _RAN_AWAY, _NOTHING_THERE = range(6)
 _REASONS = {
     _NO_COLOUR: Reason.NO_BALL, _OUT_OF_VIEW: Reason.AT_BORDER, _CUT_OFF: Reason.AT_BORDER, _RAN_AWAY: Reason.NO_BALL,
@@ -89,6 +91,7 @@ def _ball_of(view: Array, answers: Array) -> Array:
     ball = np.empty(BALL_SIZE)
     ball[BALL_RADIUS], ball[LUMA_VAR], ball[CHROMA_VAR] = view[RADIUS], answers[0], answers[1]
     ball[STREAK_U], ball[STREAK_V] = view[SPEED_U] * answers[2], view[SPEED_V] * answers[2]
+    ball[BALL_LONGER_U], ball[BALL_LONGER_UV] = view[LONGER_U], view[LONGER_UV]
     return ball
 
 
@@ -197,6 +200,7 @@ def _find_and_fit(
     at_once = hidden_variance(found[SHARES:], AT_ONCE, whole, ball)
     hidden = max(at_once, hidden_variance(lately[ball_index], IN_THE_END, whole, ball))
     fit[2], fit[3], fit[4], fit[5] = found[2] + hidden, found[3], found[3], found[4] + hidden
-    fit[_SHOWN:] = found[SHARES:]
+    fit[_SHOWN:_CENTRE_U] = found[SHARES:]
+    fit[_CENTRE_U], fit[_CENTRE_V] = fit[0] - view[SHIFT_U], fit[1] - view[SHIFT_V]
     fit[_MISFIT], fit[_SPOT_U], fit[_SPOT_V] = found[5], spot_u, spot_v
     return _FOUND

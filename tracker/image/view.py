@@ -9,12 +9,14 @@ import numpy as np
 
 from tracker.camera import Camera
 from tracker.filter.measure import camera_table, marker_points, pixels, project
+from tracker.image.outline import OUTLINE_SIZE, outline
 from tracker.maths.compiled import compiled
 from tracker.rig import Rig
 from tracker.state import State
 from tracker.types import Array
 
-U, V, S_UU, S_UV, S_VV, RADIUS, SPEED_U, SPEED_V, RAY_X, RAY_Y, DEPTH, _COLUMNS = range(12)
+U, V, S_UU, S_UV, S_VV, SPEED_U, SPEED_V, RAY_X, RAY_Y, DEPTH, RADIUS, _COLUMNS = *range(11), 10 + OUTLINE_SIZE
+LONGER_U, LONGER_UV, SHIFT_U, SHIFT_V = range(RADIUS + 1, _COLUMNS)
 
 
 @lru_cache(maxsize=16)
@@ -23,26 +25,20 @@ def _radii(rig: Rig) -> Array:
     return np.array([ball.radius_m for ball in rig.marker.balls])
 
 
-@lru_cache(maxsize=16)
-def _focals_px(rig: Rig) -> tuple[float, ...]:
-    """Return each camera's focal length [px]."""
-    return tuple(camera.focal_px for camera in rig.cameras)
-
-
 def expected_views(state: State, rig: Rig, camera: int, t_ns: int) -> Array:
     """Return what a camera is expected to see, a row each ball, for a frame that the camera stamped t_ns.
 
     Args:
         state: may be of another time than t_ns; its velocities and accelerations bridge the difference.
     Returns:
-        (n, 11): centre U, V [px], NaN behind the camera; its covariance S_UU, S_UV, S_VV, a pixel of doubt about the
-        prediction included [px^2]; RADIUS [px]; how fast its image moves, SPEED_U, SPEED_V [px/s]; the ray to it
-        (RAY_X, RAY_Y, 1) in C; and its DEPTH before the camera [m], these by the state's own time.
+        (n, 15): centre U, V [px], NaN behind the camera; its covariance S_UU, S_UV, S_VV, a pixel of doubt about the
+        prediction included [px^2]; how fast its image moves, SPEED_U, SPEED_V [px/s]; and by the state's own time the
+        ray to it (RAY_X, RAY_Y, 1) in C, its DEPTH before the camera [m], and its outline from RADIUS on, see
+        `outline.RADIUS`.
     """
     lag_s = (t_ns - state.t_ns) * 1e-9
     table, points, seen_by = camera_table(rig), marker_points(rig), rig.cameras[camera]
-    radii_m, focal_px = _radii(rig), _focals_px(rig)[camera]
-    views = _views(state.mean, state.manoeuvre_s, state.P, camera, lag_s, table, points, radii_m, focal_px)
+    views = _views(state.mean, state.manoeuvre_s, state.P, camera, lag_s, table, points, _radii(rig))
     return _rolled(views, seen_by) if seen_by.readout_ns else views
 
 
@@ -77,26 +73,26 @@ def _whereabouts(mean: Array, camera: Array, reach: float) -> tuple[float, float
     return u, v, reach / math.sqrt(distance2)
 
 
-@compiled("void(f8[::1], f8[::1], f8[::1], f8[::1])")
-def _place(mean: Array, m_inB: Array, camera: Array, view: Array) -> None:
-    """Fill in the ray to a ball and its depth."""
+@compiled("void(f8[::1], f8[::1], f8[::1], f8[::1], f8[::1])")
+def _place(mean: Array, m_inB: Array, camera: Array, ball_inW: Array, view: Array) -> None:
+    """Fill in a ball's centre (3,), the ray to it and its depth."""
     X = Y = Z = 0.0
     for i in range(3):
-        d = mean[i] - camera[21 + i]
+        ball_inW[i] = mean[i]
         for j in range(3):
-            d += mean[3 + 3 * i + j] * m_inB[j]
+            ball_inW[i] += mean[3 + 3 * i + j] * m_inB[j]
+        d = ball_inW[i] - camera[21 + i]
         X, Y, Z = X + camera[12 + 3 * i] * d, Y + camera[13 + 3 * i] * d, Z + camera[14 + 3 * i] * d
     view[RAY_X], view[RAY_Y], view[DEPTH] = X / Z, Y / Z, Z
 
 
-@compiled("f8[:, ::1](f8[::1], f8, f8[:, ::1], i8, f8, f8[:, ::1], f8[:, ::1], f8[::1], f8)")
+@compiled("f8[:, ::1](f8[::1], f8, f8[:, ::1], i8, f8, f8[:, ::1], f8[:, ::1], f8[::1])")
 def _views(
-    mean: Array, T: float, P: Array, camera: int, lag_s: float, table: Array, points_inB: Array, radii_m: Array,
-    focal_px: float,
-) -> Array:  # fmt: skip
+    mean: Array, T: float, P: Array, camera: int, lag_s: float, table: Array, points_inB: Array, radii_m: Array
+) -> Array:
     """Fill in the rows of `expected_views`."""
     n = len(points_inB)
-    views = np.empty((n, _COLUMNS))
+    views, work = np.empty((n, _COLUMNS)), np.empty((8, 3))
     h, H = pixels(mean, T, np.full(n, camera), np.arange(n), np.full(n, lag_s), table, points_inB)
     for b in range(n):
         view, H_u, H_v = views[b], H[2 * b], H[2 * b + 1]
@@ -114,8 +110,8 @@ def _views(
         for i in range(6):  # the pose goes with velocity and rate, which stand after the attitude
             view[SPEED_U] += H_u[i] * mean[12 + i]
             view[SPEED_V] += H_v[i] * mean[12 + i]
-        _place(mean, points_inB[b], table[camera], view)
-        view[RADIUS] = focal_px * radii_m[b] / view[DEPTH] if view[DEPTH] > 0.0 else math.inf
+        _place(mean, points_inB[b], table[camera], work[7], view)
+        outline(work[7], radii_m[b], table[camera], work[:7], view[RADIUS:])
     return views
 
 

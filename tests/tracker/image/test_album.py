@@ -22,7 +22,7 @@ KNOWN = Appearance(Response(0.4, 0.7))
 
 
 def view(radius_px: float) -> list[float]:
-    row = [0.0] * 11
+    row = [0.0] * (VIEW_RADIUS + 1)
     row[VIEW_RADIUS], row[RAY_X] = radius_px, 0.01
     return row
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from tracker.image.harmonics import LAMBERT, TERMS, terms_at
-from tracker.image.lamps import FARTHEST_M, ROOM_TERMS, explained
+from tracker.image.lamps import FARTHEST_M, MOVING, ROOM_TERMS, explained
 from tracker.image.light import Light
 from tracker.maths.sphere import spread
 from tracker.types import Array
@@ -20,6 +22,8 @@ SEVERAL = ((LAMP, 0.25), (np.array([-0.8, 0.0, 0.6]), 0.25), (np.array([0.0, 0.6
 SIDES = np.array([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])  # where two cameras stand
 NO_TURN = np.eye(3)
 SHADOW = ((terms_at(LAMP[None]) / LAMBERT[:, None]).T @ terms_at(NORMALS)).min() - 0.01  # of one lamp, by the harmonics
+SOFT = np.concatenate(((1.0, 0.1, -0.2, 0.3), np.zeros(TERMS - 4)))
+GROWN = np.concatenate((np.zeros(2 * MOVING), 0.4 * np.eye(MOVING)[3]))  # more from above, the higher
 Lamps = tuple[tuple[Array, float], ...]
 
 
@@ -137,3 +141,25 @@ def test_light_is_the_same_about_another_middle() -> None:
     anew = other.learned(*seen, NO_TURN, ELSEWHERE - shift_m).solved([]).at(np.zeros(3))
     as_before = light.learned(*seen, NO_TURN, ELSEWHERE).solved([]).at(shift_m)
     assert anew.apart_from(as_before) < 0.05
+
+
+@pytest.mark.parametrize("power", [0.7, 1.4])
+def test_light_that_another_gamma_shows_is_the_power_of_what_it_was(power: float) -> None:
+    """Its mean is 1 again; and what differs by place does so by the slope of that power."""
+    before = Light(terms=SOFT, room=replace(Light().room, terms=np.append(SOFT, GROWN)))
+    after = before.taken_to(power)
+    wanted = (terms_at(NORMALS).T @ before.terms) ** power
+    assert np.abs(terms_at(NORMALS).T @ after.terms - wanted / wanted.mean()).max() < 0.05
+    there = np.array([0.0, 0.0, 0.1])
+    grown = (terms_at(NORMALS).T @ before.at(there).terms) ** power
+    assert np.abs(terms_at(NORMALS).T @ after.at(there).terms - grown / grown.mean()).max() < 0.05
+
+
+def test_what_was_learned_is_carried_over_to_another_gamma_and_counts_less() -> None:
+    before = learned(ONE_LAMP, SIDES[0], (1.0,) * 30)
+    after = before.taken_to(1.3)
+    terms = terms_at(NORMALS[NORMALS @ SIDES[0] > 0.1])
+    old, carried, anew = (light.terms @ terms for light in (before, after, after.solved(())))
+    old, carried, anew = old / old.mean(), carried / carried.mean(), anew / anew.mean()
+    assert np.std(anew - carried) < 0.3 * np.std(old - carried)
+    assert (np.diag(after.information) <= np.diag(before.information)).all()

@@ -22,6 +22,7 @@ from tracker.types import Array
 RIG = make_rig(
     paper_rig().cameras, moved_marker(paper_rig().marker, so3.from_euler(0.2, -0.3, 0.4), np.array([0.02, -0.03, 0.05]))
 )
+ANGLES = np.linspace(0.0, 2.0 * math.pi, 90, endpoint=False)
 VECTOR = st.tuples(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0), st.floats(-1.0, 1.0)).map(np.array)
 
 
@@ -54,9 +55,12 @@ def test_a_ball_is_expected_as_large_as_it_is_far_and_as_fast_as_it_moves(
     assert np.allclose(
         views[:, RAY_X : DEPTH + 1], points_inC / np.column_stack((points_inC[:, 2:], points_inC[:, 2:], np.ones(3)))
     )
-    assert np.allclose(
-        views[:, RADIUS], seen_by.focal_px * np.array([b.radius_m for b in RIG.marker.balls]) / points_inC[:, 2]
-    )
+    for ball, point_inC, radius_px in zip(RIG.marker.balls, points_inC, views[:, RADIUS], strict=True):
+        axes = ball.radius_m * np.linalg.svd(point_inC[None])[2][1:]  # two across the ray
+        round_it = point_inC + np.column_stack((np.cos(ANGLES), np.sin(ANGLES))) @ axes
+        u, v = seen_by.project(round_it @ seen_by.R_CtoW.T + seen_by.p_CinW)[0].T
+        area_px2 = 0.5 * abs(u @ np.roll(v, 1) - v @ np.roll(u, 1))
+        assert np.isclose(radius_px, math.sqrt(area_px2 / math.pi), rtol=1e-3)
     assert np.allclose(views[:, SPEED_U : SPEED_U + 2], (later - sooner) / 2e-6, rtol=1e-4, atol=0.01)
 
 
