@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.image.behind import Room
-from tracker.image.centre import MAX_SHIFT_PX
+from tracker.image.centre import MAX_SHIFT_PX, SHIFT_SHARE
 from tracker.image.colour_table import ColourTable
 from tracker.image.evidence import LEAST_EVIDENCE
 from tracker.image.hiding import AT_ONCE, IN_THE_END, hidden_variance, whole_one
@@ -164,7 +164,7 @@ def _find_and_fit(
     for pixels in (bright, colour):
         distrust(pixels, held[ball_index], ball[BALL_RADIUS], ball[STREAK_U], ball[STREAK_V], du, dv)
     gauss_newton(bright, colour, luma, luma_made, chroma, chroma_made, ball, du, dv, found)
-    if not (found[0] - du) ** 2 + (found[1] - dv) ** 2 <= MAX_SHIFT_PX**2:
+    if not (found[0] - du) ** 2 + (found[1] - dv) ** 2 <= max(MAX_SHIFT_PX, SHIFT_SHARE * ball[BALL_RADIUS]) ** 2:
         return _RAN_AWAY
     if found[EVIDENCE] < LEAST_EVIDENCE:
         return _NOTHING_THERE
