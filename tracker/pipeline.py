@@ -244,7 +244,10 @@ class Tracker:
     def _start(self, attempts: Sequence[Seen], harvest: Harvest) -> Update | None:
         """Start on the marker in the first of some sets of blobs in which it is."""
         for number, seen in enumerate(attempts, start=1):
-            found = self._start_among(seen, harvest if number == len(attempts) else Harvest())
+            tried = Harvest()
+            found = self._start_among(seen, tried)
+            if found is not None or number == len(attempts):
+                harvest.add(tried)
             if found is not None:
                 return found
         return None

@@ -10,8 +10,11 @@ import cv2
 import numpy as np
 import pytest
 
+from bridge.settings import load_settings
+from tests.system.bumps import CLOCKS
 from tests.system.flights import DARK, DURATION_S, FRAMES, LINEAR, RATE_HZ, RIG, TIMING, VEHICLE
 from tools.bench.trial import Flown, Trial, tracked
+from tools.session import tracker_of
 from tracker.scene import SceneRenderer, Trouble
 from tracker.scene.backdrop import backdrop
 from tracker.sources.paths import Pose, ScriptedPath
@@ -137,3 +140,11 @@ def test_the_ball_is_seen_before_the_wood(case: Case) -> None:
     run = flown(case)
     assert (run.nis_dof == ALL_SEEN).mean() > 0.85
     assert run.between(case.stands_s + 1.0, DURATION_S).position_mm.mean() < 0.3
+
+
+def test_what_a_track_starts_on_is_told() -> None:
+    """Before wood by the first of two attempts: the balls without the room, and then with it."""
+    tracker = tracker_of(load_settings("lab"), RIG, CLOCKS)
+    steps = (tracker.step(frame) for frame in frames(CASES[0]))
+    first = next(step for step in steps if step.estimates)
+    assert len(first.sightings) == len(RIG.cameras) * len(RIG.marker)
