@@ -24,6 +24,14 @@ class Harvest:
     find_ns: int = 0
     filter_ns: int = 0
 
+    def add(self, tried: Harvest) -> None:
+        """Take over what an attempt gave that counts."""
+        self.sightings += tried.sightings
+        self.rejections += tried.rejections
+        self.refused += tried.refused
+        self.find_ns += tried.find_ns
+        self.filter_ns += tried.filter_ns
+
     def stages(self, wait_ns: int, took_ns: int) -> dict[str, int]:
         """Return what each stage took of a round's time [ns]; what is neither `find` nor `filter` is `track`."""
         rest_ns = took_ns - self.find_ns - self.filter_ns

@@ -25,15 +25,14 @@ from tracker.harvest import Harvest
 from tracker.health.background import LIMIT_PX
 from tracker.health.mend import SHARE
 from tracker.health.watch import CalibrationWatch
-from tracker.image.detect import Blob
 from tracker.image.eyes import Eyes
-from tracker.image.look import look_everywhere
 from tracker.image.tint import Gains
 from tracker.intake import Intake
 from tracker.rig import Rig
 from tracker.rounds import Rounds
 from tracker.standing import Health
 from tracker.start.acquire import Seen, first_state, together
+from tracker.start.whole import Whole, look_through, to_start_on
 from tracker.state import OFFSETS, State
 from tracker.study import Round, Study
 from tracker.tuning import Tuning
@@ -67,7 +66,7 @@ class Tracker:
         self._study = Study(rig, tuning, self._eyes, stopwatch)
         self._history = History(tuning.lag_rounds)
         self._departure = Departure(tuning.lag_rounds, stopwatch)
-        self._whole: dict[int, tuple[Frame, list[list[Blob]]]] = {}
+        self._whole: dict[int, Whole] = {}
         self._track = TrackState.SEARCHING
         self._lights_tried = 0
         self._continuity = Continuity(tuning)
@@ -208,11 +207,12 @@ class Tracker:
         """Look for the marker in whole frames, this round's and the other cameras' newest; start the track on it."""
         gains = self._eyes.gains
         for frame in frames:
-            self._whole[frame.camera] = (frame, self._look_everywhere(frame, gains))
-        fresh = {c: w for c, w in self._whole.items() if t_ns - w[0].t_ns <= self._tuning.coast_limit_ns // 2}
-        found = self._start(fresh, harvest)
+            self._whole[frame.camera] = self._look_through(frame, gains)
+        fresh = [w for w in self._whole.values() if t_ns - w.frame.t_ns <= self._tuning.coast_limit_ns // 2]
+        found = self._start(to_start_on(fresh), harvest)
         if found is None and self._track is not TrackState.TRACKING:
             found = self._search_in_other_light(fresh)
+            self._eyes.suppose_behind(frames if found is None else ())
         if found is None:
             return None
         if not self._continuity.believes(found.state):
@@ -226,21 +226,33 @@ class Tracker:
         self._track = TrackState.TRACKING
         return found
 
-    def _look_everywhere(self, frame: Frame, gains: Sequence[Gains]) -> list[list[Blob]]:
-        return look_everywhere(frame, self._rig.cameras[frame.camera], self._rig, gains[frame.camera])
+    def _look_through(self, frame: Frame, gains: Sequence[Gains]) -> Whole:
+        camera = frame.camera
+        room = self._eyes.room_behind(camera)
+        return look_through(frame, self._rig.cameras[camera], self._rig, gains[camera], room)
 
-    def _search_in_other_light(self, fresh: Seen) -> Update | None:
+    def _search_in_other_light(self, fresh: Sequence[Whole]) -> Update | None:
         """Look at the same frames as if the light had another colour, each time another one."""
         gains, others = self._eyes.gains, self._eyes.other_gains(self._lights_tried)
         self._lights_tried += 1
         self._eyes.suppose(others)
-        seen = {camera: (frame, self._look_everywhere(frame, others)) for camera, (frame, _) in fresh.items()}
-        found = self._start(seen, Harvest())
+        found = self._start(to_start_on([self._look_through(one.frame, others) for one in fresh]), Harvest())
         if found is None:
             self._eyes.suppose(gains)
         return found
 
-    def _start(self, seen: Seen, harvest: Harvest) -> Update | None:
+    def _start(self, attempts: Sequence[Seen], harvest: Harvest) -> Update | None:
+        """Start on the marker in the first of some sets of blobs in which it is."""
+        for number, seen in enumerate(attempts, start=1):
+            tried = Harvest()
+            found = self._start_among(seen, tried)
+            if found is not None or number == len(attempts):
+                harvest.add(tried)
+            if found is not None:
+                return found
+        return None
+
+    def _start_among(self, seen: Seen, harvest: Harvest) -> Update | None:
         """Start on the marker among blobs, if every ball's image bears it out."""
         start = first_state(seen, self._rig, self._tuning.process)
         if isinstance(start, Rejected):

@@ -17,7 +17,14 @@ from tracker.maths.compiled import compiled
 from tracker.types import Frame, Image
 
 TILE_PX = 16
-KNOWN, WELL_KNOWN, ENOUGH = 4, 8, 24  # looks from which a tile serves, and tells gamma; the most that its mean is of
+SUPPOSED = 1  # of `Room.looks`: of a tile that nobody looked at beside the vehicle, so that it may be there itself
+KNOWN, WELL_KNOWN = SUPPOSED + 4, SUPPOSED + 8  # from which a tile serves centres, and tells gamma
+ENOUGH = SUPPOSED + 24  # looks that a tile's mean is of at the most
+ALIKE_LEVELS = 12.0  # a pixel that is no further from the room, once lit alike, shows it: noise and JPEG stay below
+SHADED, BRIGHTER = (
+    0.4,
+    1.25,
+)  # of the light: the vehicle's shadow or a thin tube leave so much, lamps flicker and warm up
 APART_NS = 250_000_000  # from look to look: a hand or a tube that stays for a moment is not the room
 MANY, SOME, FEW = 96, 8, 16  # tiles a round: not known yet; of those that would be known better; of all by turn
 NEARER = 4.0  # tiles further away that count as much as one look more
@@ -26,7 +33,10 @@ CHANGED_LEVELS = 12.0  # of the green channel, one sigma within a tile: no noise
 
 
 class Room(NamedTuple):
-    """What stands behind: mean (height, width, 3) BGR [grey levels], and looks (rows, columns) at each tile so far."""
+    """What stands behind: mean (height, width, 3) BGR [grey levels], and looks (rows, columns) at each tile so far.
+
+    looks: 0 where nothing is known, SUPPOSED, or SUPPOSED and one more for each look.
+    """
 
     mean: NDArray[np.float32]
     looks: NDArray[np.uint8]
@@ -46,6 +56,12 @@ class Behind:
         self._next = np.zeros(1, np.int64)
         self._eager = True  # whether the last look was at something not known yet
         self._turn = 0
+        self._lately: list[Frame] = []  # some of the last frames without a track
+
+    @property
+    def known(self) -> Room:
+        """Return the room, `NO_ROOM` while nothing of it is known."""
+        return self.room if self.room.looks.any() else NO_ROOM
 
     def is_due(self) -> bool:
         """Say whether to look in this round of the camera: in each while there is much to learn, then in some."""
@@ -57,10 +73,24 @@ class Behind:
 
         middle_px: of the vehicle in the frame.  clear_px: how far round it the vehicle may hide the room.
         """
+        self._lately.clear()
         self._eager = _learn(frame.image, *self.room, *middle_px, clear_px, frame.t_ns, self._looked_ns, self._next)
+
+    def suppose(self, frame: Frame) -> None:
+        """Take for the room, where nothing else is known of it, what showed in most of some frames without a track.
+
+        The vehicle may be anywhere: what it hid all the time is taken for the room, too. So nothing but balls that move
+        are told from it, and no centre is fitted by it.
+        """
+        if self._lately and abs(frame.t_ns - self._lately[-1].t_ns) < APART_NS:
+            return
+        self._lately = [*self._lately[-2:], frame]
+        three = [self._lately[0]] * (3 - len(self._lately)) + self._lately
+        _suppose(three[0].image, three[1].image, three[2].image, *self.room)
 
     def forget(self) -> None:
         """Start anew: the camera has moved."""
+        self._lately.clear()
         self.room.looks[:] = 0
         self._eager = True
 
@@ -85,6 +115,73 @@ def is_known(looks: NDArray[np.uint8], u: int, v: int, half: int, least: int) ->
     return True
 
 
+@compiled("b1(Array(u1, 1, 'C', True), f4[::1], i8)", inline=True)
+def _is_alike(image: NDArray[np.uint8], mean: NDArray[np.float32], at: int) -> bool:
+    """Say whether a pixel, whose first byte is given, looks as the room does, lit as brightly as it is there now."""
+    both = squares = 0.0
+    for i in range(at, at + 3):
+        both += image[i] * mean[i]
+        squares += mean[i] * mean[i]
+    light = min(max(both / max(squares, 1.0), SHADED), BRIGHTER)
+    off = 0.0
+    for i in range(at, at + 3):
+        off = max(off, abs(image[i] - light * mean[i]))
+    return bool(off <= ALIKE_LEVELS * min(light, 1.0))
+
+
+@compiled(
+    "UniTuple(i8, 2)(Array(u1, 1, 'C', True), i8, i8, Array(f4, 3, 'C'), Array(u1, 2, 'C'), Array(b1, 2, 'C', True),"
+    "i8[:, ::1], i8)"
+)
+def without_room(
+    image: NDArray[np.uint8], width: int, row: int, mean: NDArray[np.float32], looks: NDArray[np.uint8],
+    hues: NDArray[np.bool_], pixels: NDArray[np.int64], count: int,
+) -> tuple[int, int]:  # fmt: skip
+    """Leave out of a row's pixels those of no ball's hue, and those that look as the known room does.
+
+    Args:
+        image: all bytes of a BGR image, `width` pixels a row.
+        hues: of the balls' colours, see `ColourTable`.
+        pixels (any, 4): column, value, spread and hue, `count` of them.
+    Returns:
+        How many are left, and how many looked as the room does.
+    """
+    left, alike, means = 0, 0, mean.reshape(mean.size)
+    for k in range(count):
+        column, hue = pixels[k, 0], pixels[k, 3]
+        of_a_ball = False
+        for ball in range(len(hues)):
+            of_a_ball = of_a_ball or hues[ball, hue]
+        if not of_a_ball:
+            continue
+        down, along = row // TILE_PX, column // TILE_PX
+        known = down < looks.shape[0] and along < looks.shape[1] and looks[down, along] >= SUPPOSED
+        if known and _is_alike(image, means, 3 * (row * width + column)):
+            alike += 1
+            continue
+        for i in range(4):
+            pixels[left, i] = pixels[k, i]
+        left += 1
+    return left, alike
+
+
+@compiled(
+    "void(Array(u1, 3, 'C', True), Array(u1, 3, 'C', True), Array(u1, 3, 'C', True), Array(f4, 3, 'C'),"
+    "Array(u1, 2, 'C'))"
+)
+def _suppose(oldest: Image, middle: Image, newest: Image, mean: NDArray[np.float32], looks: NDArray[np.uint8]) -> None:
+    """Fill in the median of three images in the tiles that nobody has looked at."""
+    for row in range(looks.shape[0] * TILE_PX):
+        for column in range(looks.shape[1] * TILE_PX):
+            if looks[row // TILE_PX, column // TILE_PX] <= SUPPOSED:
+                for i in range(3):
+                    a, b, c = oldest[row, column, i], middle[row, column, i], newest[row, column, i]
+                    mean[row, column, i] = max(min(a, b), min(max(a, b), c))
+    for row in range(looks.shape[0]):
+        for column in range(looks.shape[1]):
+            looks[row, column] = max(looks[row, column], SUPPOSED)
+
+
 @compiled("f8(i8, i8, f8, f8)")
 def _away_px(row: int, column: int, u: float, v: float) -> float:
     """Return how far a tile's nearest pixel is from a place."""
@@ -96,7 +193,7 @@ def _away_px(row: int, column: int, u: float, v: float) -> float:
 @compiled("void(Array(u1, 3, 'C', True), Array(f4, 3, 'C'), Array(u1, 2, 'C'), i8, i8)")
 def _look_at(image: Image, mean: NDArray[np.float32], looks: NDArray[np.uint8], row: int, column: int) -> None:
     """Take a tile into its mean, or begin it anew where something else stands now."""
-    top, left, known = row * TILE_PX, column * TILE_PX, looks[row, column]
+    top, left, known = row * TILE_PX, column * TILE_PX, max(0, looks[row, column] - SUPPOSED)
     if known > 0:
         total = squares = 0.0
         for y in range(top, top + TILE_PX):
@@ -107,8 +204,8 @@ def _look_at(image: Image, mean: NDArray[np.float32], looks: NDArray[np.uint8], 
         share = 1.0 / TILE_PX**2
         if squares * share - (total * share) ** 2 > CHANGED_LEVELS**2:
             known = 0
-    looks[row, column] = min(known + 1, ENOUGH)
-    weight = np.float32(1.0 / looks[row, column])
+    looks[row, column] = min(SUPPOSED + known + 1, ENOUGH)
+    weight = np.float32(1.0 / (looks[row, column] - SUPPOSED))
     pixels, means = image.reshape(image.size), mean.reshape(mean.size)
     for y in range(top, top + TILE_PX):
         first = 3 * (y * image.shape[1] + left)
@@ -134,7 +231,7 @@ def _learn(
             if known >= ENOUGH or abs(t_ns - looked_ns[row, column]) < APART_NS:
                 continue
             away_px = _away_px(row, column, u, v)
-            need = NEARER * known + away_px / TILE_PX
+            need = NEARER * max(0, known - SUPPOSED) + away_px / TILE_PX
             if away_px < clear_px or (count == MANY and need >= needs[MANY - 1]):
                 continue
             count = min(count + 1, MANY)

@@ -25,7 +25,8 @@ from tracker.image.reading import LUMA_VAR
 from tracker.image.template import Template, template_for, variance_of
 from tracker.types import Array, Image, Reason, frozen_array
 
-MAX_SHIFT_PX = 1.5
+MAX_SHIFT_PX = 1.5  # of a centre from its spot's middle; or
+SHIFT_SHARE = 0.3  # of its radius, where that is more: the dark side of a large ball may be too dark for a spot
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,7 +76,10 @@ def fit_centre(image: Image, ball: Expected) -> Centre | Reason:
     numbers = numbers_of(ball)
     gauss_newton(patch.bright, patch.colour, *luma, *chroma, numbers, extent.du, extent.dv, fit)
     du, dv, cov_uu, cov_uv, cov_vv, misfit, evidence = fit[: EVIDENCE + 1].tolist()
-    if not (math.hypot(du - extent.du, dv - extent.dv) <= MAX_SHIFT_PX and evidence >= LEAST_EVIDENCE):
+    if not (
+        math.hypot(du - extent.du, dv - extent.dv) <= max(MAX_SHIFT_PX, SHIFT_SHARE * ball.radius_px)
+        and evidence >= LEAST_EVIDENCE
+    ):
         return Reason.NO_BALL
     uv_px = frozen_array((extent.u + du, extent.v + dv))
     hidden = hidden_variance(fit[SHARES:], AT_ONCE, WHOLE, numbers)

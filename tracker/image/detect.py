@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from tracker.image.behind import NO_ROOM, Room
 from tracker.image.colour_table import ColourTable, colours_of
 from tracker.image.spots import find_spots
 from tracker.image.tint import NEUTRAL, Gains
@@ -41,7 +42,12 @@ def region_around(uv_px: Array, half_px: Array, width_px: int, height_px: int) -
 
 
 def find_blobs(
-    image: Image, region: Region | None, balls: tuple[Ball, ...], max_area_px: float, gains: Gains = NEUTRAL
+    image: Image,
+    region: Region | None,
+    balls: tuple[Ball, ...],
+    max_area_px: float,
+    gains: Gains = NEUTRAL,
+    room: Room = NO_ROOM,
 ) -> list[list[Blob]]:
     """Find the blobs of each ball's colour.
 
@@ -51,6 +57,7 @@ def find_blobs(
         balls: what to look for.
         max_area_px: larger blobs are no ball [px^2].
         gains: of the light.
+        room: what is known to stand behind: what looks like it is no ball.
     Returns:
         For each ball its blobs in the whole image's pixels, largest first.
     """
@@ -58,12 +65,12 @@ def find_blobs(
         height, width = image.shape[:2]
         region = Region(0, 0, width, height)
     blobs: list[list[Blob]] = [[] for _ in balls]
-    for ball, u, v, area in spots_in(image, region, colours_of(balls, gains), max_area_px).tolist():
+    for ball, u, v, area in spots_in(image, region, colours_of(balls, gains), max_area_px, room).tolist():
         blobs[int(ball)].append(Blob(frozen_array((u, v)), area))
     return blobs
 
 
-def spots_in(image: Image, region: Region, colours: ColourTable, max_area_px: float) -> Array:
+def spots_in(image: Image, region: Region, colours: ColourTable, max_area_px: float, room: Room = NO_ROOM) -> Array:
     """Find the blobs of each of the colours of a table, as plain numbers: some microseconds for a ball's surroundings.
 
     Args:
@@ -71,6 +78,7 @@ def spots_in(image: Image, region: Region, colours: ColourTable, max_area_px: fl
         region: where to look; it must lie within the image.
         colours: from `tracker.image.colour_table.colours_of`.
         max_area_px: larger blobs are no ball [px^2].
+        room: what is known to stand behind.
     Returns:
         (m, 4): index of the colour, centroid u and v in the whole image [px], area [px^2]; largest first.
     Raises:
@@ -80,8 +88,10 @@ def spots_in(image: Image, region: Region, colours: ColourTable, max_area_px: fl
     height, width = image.shape[:2]
     if not (0 <= left <= right <= width and 0 <= top <= bottom <= height):  # the compiled loop checks no index
         raise ValueError(f"{region} reaches beyond an image of {width} x {height} px")
-    return find_spots(
+    spots, _ = find_spots(
         np.ascontiguousarray(image),
+        room.mean,
+        room.looks,
         left,
         top,
         right,
@@ -93,3 +103,4 @@ def spots_in(image: Image, region: Region, colours: ColourTable, max_area_px: fl
         colours.red,
         float(max_area_px),
     )
+    return spots

@@ -9,7 +9,7 @@ import numpy as np
 
 from tracker.image.album import Album
 from tracker.image.appearance import MISFIT_MAX, Appearance
-from tracker.image.behind import Behind
+from tracker.image.behind import Behind, Room
 from tracker.image.clarity import Clarity
 from tracker.image.exposure import overexposed
 from tracker.image.hiding import never_seen, remember
@@ -261,6 +261,15 @@ class Eyes:
             u, v, clear_px = whereabouts(state, self._rig, frame.camera)
             if math.isfinite(u) and math.isfinite(v):
                 behind.learn(frame, (u, v), clear_px)
+
+    def room_behind(self, camera: int) -> Room:
+        """Return what is known to stand behind in one camera's pictures, `NO_ROOM` for nothing."""
+        return self._behind[camera].known
+
+    def suppose_behind(self, frames: Sequence[Frame]) -> None:
+        """Take for the room, as long as nothing better is known, what stays in frames without a track."""
+        for frame in frames:
+            self._behind[frame.camera].suppose(frame)
 
     def _follow_the_light(self, look: Look, seen: Sequence[BallSighting]) -> None:
         """Learn the light from the balls' colours: of each camera at first, then of those that see now in turn."""

@@ -217,8 +217,13 @@ def _name(rig: Rig, ball: int) -> str:
     return rig.marker.balls[ball].name
 
 
-def look_everywhere(frame: Frame, camera: Camera, rig: Rig, gains: Gains = NEUTRAL) -> list[list[Blob]]:
-    """Return for each ball of the marker the blobs of its colour in the whole image, in a light, largest first."""
+def look_everywhere(
+    frame: Frame, camera: Camera, rig: Rig, gains: Gains = NEUTRAL, room: Room = NO_ROOM
+) -> list[list[Blob]]:
+    """Return for each ball of the marker the blobs of its colour in the whole image, in a light, largest first.
+
+    room: what is known to stand behind, which is taken off first.
+    """
     largest = max(ball.radius_m for ball in rig.marker.balls)
     most_px = math.pi * (camera.focal_px * largest / NEAREST_M) ** 2
-    return find_blobs(frame.image, None, rig.marker.balls, most_px, gains)
+    return find_blobs(frame.image, None, rig.marker.balls, most_px, gains, room)

@@ -8,27 +8,27 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.image.behind import Room
-from tracker.image.centre import MAX_SHIFT_PX
+from tracker.image.centre import MAX_SHIFT_PX, SHIFT_SHARE
 from tracker.image.colour_table import ColourTable
 from tracker.image.evidence import LEAST_EVIDENCE
 from tracker.image.hiding import AT_ONCE, IN_THE_END, hidden_variance, whole_one
 from tracker.image.holder import distrust
+from tracker.image.nearest import nearest_spot
 from tracker.image.newton import EVIDENCE, FIT_SIZE, SHARES, gauss_newton
 from tracker.image.patch import Response, cut_pixels, light_of, trust_of
 from tracker.image.reading import BALL_SIZE, CHROMA_VAR, LUMA_VAR, STREAK_U, STREAK_V
 from tracker.image.reading import LONGER_U as BALL_LONGER_U
 from tracker.image.reading import LONGER_UV as BALL_LONGER_UV
 from tracker.image.reading import RADIUS as BALL_RADIUS
-from tracker.image.spots import WIDE_PX, find_spots
+from tracker.image.spots import WIDE_PX
 from tracker.image.template import MARGIN_PX, STREAK_MAX_PX, Template, variance_of
-from tracker.image.view import LONGER_U, LONGER_UV, RADIUS, S_UU, S_UV, S_VV, SHIFT_U, SHIFT_V, SPEED_U, SPEED_V, U, V
+from tracker.image.view import LONGER_U, LONGER_UV, RADIUS, S_UU, S_VV, SHIFT_U, SHIFT_V, SPEED_U, SPEED_V, U, V
 from tracker.maths.compiled import compiled
 from tracker.types import Array, Image, Reason
 
 REGION_SIGMA = 3.5
 REGION_MARGIN_PX = 3.0
 LINE_BYTES = 64  # what memory sends at a time
-LEAST_AREA_SHARE, MOST_AREA_SHARE = 0.15, 4.0  # of the ball's expected disc
 UV, COV, MISFIT, SPOT, SHOWN, CENTRE, SIZE = slice(0, 2), slice(2, 6), 6, slice(7, 9), slice(9, 12), slice(12, 14), 14
 """What a fit gives: the middle of its image [px], its covariance (uu, uv, vu, vv) [px^2], chi2 per degree of freedom,
 the coloured spot's middle [px], how much of it is there, see `hiding.SHOWN`, and where its centre is projected [px]."""
@@ -135,31 +135,6 @@ def read_ahead(image: Image, room: NDArray[np.float32], views: Array) -> int:
 
 
 @compiled(
-    "UniTuple(f8, 2)(Array(u1, 3, 'C', True), Array(i2, 2, 'C', True), Array(i2, 1, 'C', True),"
-    "Array(b1, 2, 'C', True), i8, i8, f8[::1])"
-)
-def _nearest_spot(
-    image: Image, least_spread: NDArray[np.int16], lowest_spread: NDArray[np.int16], hues: NDArray[np.bool_],
-    blue: int, red: int, view: Array,
-) -> tuple[float, float]:  # fmt: skip
-    """Return the middle of the spot nearest the prediction; NaN when there is none, infinity out of view."""
-    u, v, radius_px = view[U], view[V], view[RADIUS]
-    left, top, right, bottom = _region(view, image.shape[1], image.shape[0])
-    if not (left < right and top < bottom):
-        return np.inf, np.inf
-    area = math.pi * radius_px**2
-    most_px = MOST_AREA_SHARE * area
-    spots = find_spots(image, left, top, right, bottom, least_spread, lowest_spread, hues, blue, red, most_px)
-    nearest_u, nearest_v, least = np.nan, np.nan, np.inf
-    for k in range(len(spots)):
-        du, dv = spots[k, 1] - u, spots[k, 2] - v
-        distance2 = view[S_VV] * du * du - 2.0 * view[S_UV] * du * dv + view[S_UU] * dv * dv
-        if spots[k, 3] >= LEAST_AREA_SHARE * area and distance2 < least:
-            nearest_u, nearest_v, least = spots[k, 1], spots[k, 2], distance2
-    return nearest_u, nearest_v
-
-
-@compiled(
     "i8(Array(u1, 3, 'C', True), Array(f4, 3, 'C'), Array(u1, 2, 'C'), i8,"
     "Array(i2, 2, 'C', True), Array(i2, 1, 'C', True), Array(b1, 2, 'C', True), i8, i8,"
     "f8[:, ::1], f8[::1], i8, f8[::1], f8[::1], Array(f4, 3, 'C', True), f8[::1], Array(f4, 3, 'C', True), f8[::1],"
@@ -175,11 +150,12 @@ def _find_and_fit(
     """Find the spot nearest the prediction, cut its pixels out and fit them; fill in a row of fits, say how it went."""
     height, width, view, fit = image.shape[0], image.shape[1], views[ball_index], fits[ball_index]
     fit[_SHOWN] = np.nan
-    spot_u, spot_v = _nearest_spot(image, least_spread, lowest_spread, hues, blue, red, view)
+    region = left, top, right, bottom = _region(view, width, height)
+    if not (left < right and top < bottom):
+        return _OUT_OF_VIEW
+    spot_u, spot_v = nearest_spot(image, room, looks, (least_spread, lowest_spread, hues, blue, red), region, view)
     if np.isnan(spot_u):
         return _NO_COLOUR
-    if np.isinf(spot_u):
-        return _OUT_OF_VIEW
     ball, found = _ball_of(view, answers), np.empty(FIT_SIZE)
     streak_px = math.sqrt(ball[STREAK_U] ** 2 + ball[STREAK_V] ** 2)
     edge_px = ball[BALL_RADIUS] + min(streak_px, STREAK_MAX_PX) / 2.0  # as `patch.edge_of`
@@ -191,7 +167,7 @@ def _find_and_fit(
     for pixels in (bright, colour):
         distrust(pixels, held[ball_index], ball[BALL_RADIUS], ball[STREAK_U], ball[STREAK_V], du, dv)
     gauss_newton(bright, colour, luma, luma_made, chroma, chroma_made, ball, du, dv, found)
-    if not (found[0] - du) ** 2 + (found[1] - dv) ** 2 <= MAX_SHIFT_PX**2:
+    if not (found[0] - du) ** 2 + (found[1] - dv) ** 2 <= max(MAX_SHIFT_PX, SHIFT_SHARE * ball[BALL_RADIUS]) ** 2:
         return _RAN_AWAY
     if found[EVIDENCE] < LEAST_EVIDENCE:
         return _NOTHING_THERE

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from tracker.image.behind import without_room
 from tracker.image.colour_table import FIXED_POINT, HUE_STEPS, LEVELS
 from tracker.image.tint import UNITY
 from tracker.maths.compiled import compiled
@@ -226,11 +227,13 @@ def _enlarged(spots: NDArray[np.int64], needed: int) -> NDArray[np.int64]:
 
 
 @compiled(
-    "f8[:, ::1](Array(u1, 3, 'C', readonly=True), i8, i8, i8, i8, Array(i2, 2, 'C', readonly=True),"
-    "Array(i2, 1, 'C', readonly=True), Array(b1, 2, 'C', readonly=True), i8, i8, f8)"
+    "Tuple((f8[:, ::1], i8))(Array(u1, 3, 'C', readonly=True), Array(f4, 3, 'C'), Array(u1, 2, 'C'), i8, i8, i8, i8,"
+    "Array(i2, 2, 'C', readonly=True), Array(i2, 1, 'C', readonly=True), Array(b1, 2, 'C', readonly=True), i8, i8, f8)"
 )
 def find_spots(
     image: Image,
+    room: NDArray[np.float32],
+    looks: NDArray[np.uint8],
     left: int,
     top: int,
     right: int,
@@ -241,20 +244,22 @@ def find_spots(
     blue: int,
     red: int,
     most_px: float,
-) -> Array:
+) -> tuple[Array, int]:
     """Find the spots of each of n colours; pixels that touch by a side or a corner belong together.
 
     Args:
         image: (height, width, 3) BGR.
+        room, looks: what is known to stand behind, see `behind.Room`; what looks like it belongs to no spot.
         left, top, right, bottom: where to look, within the image; right and bottom exclusive.
         least_spread, lowest_spread, hues, blue, red: the colours, as in `tracker.image.colour_table.ColourTable`.
         most_px: larger spots are none [px^2].
     Returns:
         (m, 4): index of the colour, centroid u and v in the whole image [px], area [px^2]; largest first.
+        How many pixels of their hues were left out since the room looks like them.
     Source: run-based labelling with union-find (He, Chao, Suzuki, 2008), all colours in one pass.
     """
     colours, width = len(hues), right - left
-    spots, count = np.empty((_FIRST_CAPACITY, _COLUMNS), np.int64), 0
+    spots, count, left_out = np.empty((_FIRST_CAPACITY, _COLUMNS), np.int64), 0, 0
     pixels = np.empty((width, 4), np.int64)
     runs = np.empty((2, colours, width // 2 + 1, 3), np.int64)  # of the row above and of this one
     lengths = np.zeros((2, colours), np.int64)
@@ -270,10 +275,13 @@ def find_spots(
         if shift:
             _flag(line_bytes, flags)
         found = _coloured(line, left, lowest_spread, eights, pixels)
+        if found and looks.size:
+            found, alike = without_room(all_bytes, image.shape[1], row, room, looks, hues, pixels, found)
+            left_out += alike
         for ball in range(colours):
             lengths[here, ball] = _runs(pixels, found, least_spread, hues, ball, here, runs)
             if lengths[here, ball]:
                 if count + lengths[here, ball] > len(spots):
                     spots = _enlarged(spots, count + lengths[here, ball])
                 count = _link(spots, count, ball, row, runs, lengths)
-    return _likely(spots, count, most_px)
+    return _likely(spots, count, most_px), left_out

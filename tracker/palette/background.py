@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tracker.image.detect import Region
-from tracker.image.sight import LEAST_AREA_SHARE, MOST_AREA_SHARE
+from tracker.image.nearest import LEAST_AREA_SHARE, MOST_AREA_SHARE
 from tracker.image.spots import ASPECT_MAX, FILL_MIN, MIN_AREA_PX
 from tracker.palette.box import Paint
 from tracker.palette.chroma import chroma, hsv_of, hue_from

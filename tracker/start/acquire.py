@@ -11,7 +11,7 @@ from tracker.cadence import TOGETHER_NS
 from tracker.filter.manoeuvre import start_levels
 from tracker.filter.noise import start_noise
 from tracker.image.detect import Blob
-from tracker.image.sight import LEAST_AREA_SHARE, MOST_AREA_SHARE
+from tracker.image.nearest import LEAST_AREA_SHARE, MOST_AREA_SHARE
 from tracker.rig import Rig
 from tracker.start.associate import associate
 from tracker.start.pose3 import pose

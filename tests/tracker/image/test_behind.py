@@ -8,7 +8,7 @@ import pytest
 from tests.tracker.drawing import developed, draw_ball, draw_band, empty_canvas
 from tests.tracker.paper_rig import paper_rig
 from tests.tracker.rigs import TUNING
-from tracker.image.behind import APART_NS, ENOUGH, KNOWN, NO_ROOM, TILE_PX, Behind, Room, is_known
+from tracker.image.behind import APART_NS, ENOUGH, KNOWN, NO_ROOM, SUPPOSED, TILE_PX, Behind, Room, is_known
 from tracker.image.centre import Centre, fit_centre
 from tracker.image.patch import Expected, Response
 from tracker.image.template import FLAT
@@ -47,7 +47,7 @@ def known_at(behind: Behind, place_px: Array) -> bool:
 
 @pytest.fixture(scope="module")
 def room() -> Room:
-    return looked_at(Behind(CAMERA), written(), ENOUGH).room
+    return looked_at(Behind(CAMERA), written(), ENOUGH - SUPPOSED).room
 
 
 def test_a_room_looked_at_long_enough_is_known_to_half_its_noise(room: Room) -> None:
@@ -137,3 +137,33 @@ def test_the_vehicle_is_taken_to_reach_beyond_its_balls() -> None:
     farthest_px = np.hypot(balls_px[:, 0] - u, balls_px[:, 1] - v).max()
     assert (u, v) == pytest.approx(CAMERA.project(np.zeros((1, 3)))[0][0], abs=1e-6)
     assert 1.5 * farthest_px < clear_px < 8.0 * farthest_px
+
+
+def test_without_a_track_what_moves_is_not_taken_for_the_room() -> None:
+    behind = Behind(CAMERA)
+    for k in range(4):
+        canvas = written()
+        draw_ball(canvas, PLACE + 12.0 * k, RADIUS_PX, BALL)
+        behind.suppose(Frame(0, k * APART_NS, developed(canvas), available_ns=0))
+    assert not known_at(behind, PLACE)
+    assert (behind.room.looks == SUPPOSED).all()
+    assert np.abs(behind.room.mean - np.rint(written())).max() < 1.0
+
+
+def test_what_is_supposed_gives_way_to_the_first_look() -> None:
+    behind = Behind(CAMERA)
+    behind.suppose(Frame(0, 0, developed(empty_canvas(CAMERA)), available_ns=0))
+    looked_at(behind, written(), 1, start_ns=10 * APART_NS, clear_px=0.0)
+    part = np.s_[200:280, 260:340]
+    looks = behind.room.looks[200 // TILE_PX : 280 // TILE_PX, 260 // TILE_PX : 340 // TILE_PX]
+    assert (looks > SUPPOSED).all()
+    assert np.abs(behind.room.mean[part] - written()[part]).mean() < 1.7  # one image's noise
+
+
+def test_what_was_looked_at_is_supposed_no_otherwise() -> None:
+    behind = looked_at(Behind(CAMERA), written(), 1)
+    before = behind.room.mean.copy()
+    behind.suppose(Frame(0, 10**12, developed(empty_canvas(CAMERA)), available_ns=0))
+    known = np.kron(behind.room.looks > SUPPOSED, np.ones((TILE_PX, TILE_PX))) > 0.0
+    assert known.mean() > 0.5
+    assert np.array_equal(behind.room.mean[known], before[known])

@@ -212,3 +212,15 @@ def test_an_image_that_nobody_may_write_to_can_be_fitted() -> None:
     writeable = fitted(image, uv_px)
     image.flags.writeable = False
     assert np.array_equal(fitted(image, uv_px).uv_px, writeable.uv_px)
+
+
+@pytest.mark.parametrize(("radius_px", "off_px", "found"), [(9.0, 2.2, True), (9.0, 4.0, False), (2.8, 2.2, False)])
+def test_a_large_ball_may_be_further_from_its_spots_middle_than_a_small_one(
+    radius_px: float, off_px: float, found: bool
+) -> None:
+    """Of a large ball the dark side may show no colour."""
+    uv_px = np.array([300.3, 240.4])
+    centre = fit_centre(picture(uv_px, radius_px), expected(uv_px + np.array([off_px, 0.0]), radius_px))
+    assert isinstance(centre, Centre) is found
+    if isinstance(centre, Centre):
+        assert np.abs(centre.uv_px - uv_px).max() < 0.3
