@@ -18,7 +18,7 @@ from tracker.rig import Rig
 from tracker.state import State
 from tracker.types import Array
 
-LIGHT_PX = 0.008  # one sigma that learned light leaves however clearly balls show; more by `tracker.image.clarity`
+LIGHT_PX = 0.015  # one sigma that learned light leaves however clearly balls show; more by `tracker.image.clarity`
 STREAK_SHARE = 0.01  # of the streak: what it leaves
 
 

@@ -201,8 +201,7 @@ class Eyes:
             if self._turn % every:
                 return
             teachers = [seen[self._turn // every % len(seen)]]
-        for index in look.glances:
-            self._clarity.take(index, [one.cov_px.trace().item() / 2.0 for one in seen if one.camera == index])
+        self._clarity.take(seen, state, self._rig)
         place_m = self._placed(state)
         for sighting in teachers:
             one, index = look.fitted(sighting), sighting.camera
