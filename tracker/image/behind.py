@@ -21,10 +21,7 @@ SUPPOSED = 1  # of `Room.looks`: of a tile that nobody looked at beside the vehi
 KNOWN, WELL_KNOWN = SUPPOSED + 4, SUPPOSED + 8  # from which a tile serves centres, and tells gamma
 ENOUGH = SUPPOSED + 24  # looks that a tile's mean is of at the most
 ALIKE_LEVELS = 12.0  # a pixel that is no further from the room, once lit alike, shows it: noise and JPEG stay below
-SHADED, BRIGHTER = (
-    0.4,
-    1.25,
-)  # of the light: the vehicle's shadow or a thin tube leave so much, lamps flicker and warm up
+SHADED, BRIGHTER = 0.4, 1.25  # of the light: a shadow or a thin tube leave so much, lamps flicker and warm up
 APART_NS = 250_000_000  # from look to look: a hand or a tube that stays for a moment is not the room
 MANY, SOME, FEW = 96, 8, 16  # tiles a round: not known yet; of those that would be known better; of all by turn
 NEARER = 4.0  # tiles further away that count as much as one look more
