@@ -8,7 +8,7 @@ It reads no clock but the stopwatch it is given, and touches no file and no devi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
@@ -241,16 +241,16 @@ class Tracker:
             self._eyes.suppose(gains)
         return found
 
-    def _start(self, attempts: Sequence[Seen], harvest: Harvest) -> Update | None:
+    def _start(self, attempts: Iterable[Seen], harvest: Harvest) -> Update | None:
         """Start on the marker in the first of some sets of blobs in which it is."""
-        for number, seen in enumerate(attempts, start=1):
+        found, tried = None, Harvest()
+        for seen in attempts:
             tried = Harvest()
             found = self._start_among(seen, tried)
-            if found is not None or number == len(attempts):
-                harvest.add(tried)
             if found is not None:
-                return found
-        return None
+                break
+        harvest.add(tried)
+        return found
 
     def _start_among(self, seen: Seen, harvest: Harvest) -> Update | None:
         """Start on the marker among blobs, if every ball's image bears it out."""

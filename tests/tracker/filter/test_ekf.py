@@ -201,15 +201,6 @@ def test_a_frame_of_lies_is_rejected_as_a_whole() -> None:
     assert found.reason is Reason.FRAME_GATE
 
 
-def test_of_two_sightings_alone_that_contradict_each_other_neither_is_believed() -> None:
-    """The track is in doubt where one of them is not where it said, and the other may be there by chance."""
-    seen = sightings(FLYING, RIG, [(0, 0)], SIGMA_PX, np.random.default_rng(0))
-    assert isinstance(update(FLYING, seen[:2], RIG, GATE), Update)
-    found = update(FLYING, lie(seen[:2], 1, (40.0, 40.0)), RIG, GATE)
-    assert isinstance(found, Rejected)
-    assert found.reason is Reason.FRAME_GATE
-
-
 def test_no_sightings_are_no_update() -> None:
     found = update(FLYING, (), RIG, GATE)
     assert isinstance(found, Rejected)

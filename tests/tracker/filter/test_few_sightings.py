@@ -20,13 +20,13 @@ SLIGHTLY, FAR = (6.4, -4.8), (90.0, -60.0)  # px: as a manoeuvre may move a ball
 Shifts = Mapping[int, tuple[float, float]]
 
 
-def found(cameras: tuple[int, ...], shifts_px: Shifts) -> Update | Rejected:
-    """Update a track by what cameras see, some of the sightings moved."""
+def found(cameras: tuple[int, ...], shifts_px: Shifts, count: int | None = None) -> Update | Rejected:
+    """Update a track by what cameras see, or the first of it, some of the sightings moved."""
     views = [(camera, LATER_NS) for camera in cameras]
     seen = list(sightings(FLYING, RIG, views, 0.1, np.random.default_rng(1)))
     for index, shift_px in shifts_px.items():
         seen[index] = seen[index]._replace(uv_px=frozen_array(seen[index].uv_px + shift_px))
-    return update(predict(FLYING, LATER_NS, PROCESS), tuple(seen), RIG, 0.999)
+    return update(predict(FLYING, LATER_NS, PROCESS), tuple(seen[:count]), RIG, 0.999)
 
 
 def used(one: Update | Rejected) -> list[tuple[int, int]]:
@@ -57,3 +57,12 @@ def test_one_ball_does_not_carry_the_track_where_the_others_are_elsewhere(ball: 
     elsewhere: Shifts = {other: FAR for other in range(3) if other != ball}
     assert isinstance(found((1,), elsewhere), Rejected)
     assert set(used(found((0, 1), elsewhere))) == {(0, ball), (1, 0), (1, 1), (1, 2)}
+
+
+@pytest.mark.parametrize("liar", range(2))
+def test_of_two_sightings_alone_that_contradict_each_other_neither_is_believed(liar: int) -> None:
+    """The track is in doubt where one of them is not where it said, and the other may be there by chance."""
+    assert used(found((0,), {}, count=2)) == [(0, 0), (0, 1)]
+    one = found((0,), {liar: FAR}, count=2)
+    assert isinstance(one, Rejected)
+    assert one.reason is Reason.FRAME_GATE

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from unittest.mock import Mock
+
 import numpy as np
+import pytest
 
 from tests.tracker.drawing import developed, draw_ball, empty_canvas
 from tests.tracker.paper_rig import paper_rig
 from tracker.image.behind import KNOWN, NO_ROOM, TILE_PX, Room
+from tracker.image.look import look_everywhere
 from tracker.image.tint import NEUTRAL
 from tracker.start.whole import Whole, look_through, to_start_on
 from tracker.types import Array, Frame
@@ -45,9 +49,21 @@ def test_the_ball_alone_is_tried_first_and_then_what_else_has_its_colour() -> No
 
 
 def test_a_room_without_the_colour_is_tried_once() -> None:
-    assert len(to_start_on([whole(empty_canvas(CAMERA), empty_canvas(CAMERA))])) == 1
+    assert len(list(to_start_on([whole(empty_canvas(CAMERA), empty_canvas(CAMERA))]))) == 1
 
 
 def test_an_unknown_room_is_tried_once() -> None:
     (only,) = to_start_on([whole(shelf(), None)])
     assert [len(blobs) for blobs in only[0][1]] == [0, 0, 1]
+
+
+def test_who_starts_on_the_ball_alone_does_not_wait_for_what_else_has_its_colour(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    look = Mock(wraps=look_everywhere)
+    monkeypatch.setattr("tracker.start.whole.look_everywhere", look)
+    attempts = to_start_on([whole(shelf(), shelf())])
+    next(attempts)
+    assert look.call_count == 1
+    next(attempts)
+    assert look.call_count == 2
