@@ -23,6 +23,7 @@ from filterpy.kalman import KalmanFilter
 from tracker.filter.at_once import fit_at_once
 from tracker.filter.batch import Batch, Sighted, make_batch, sighted
 from tracker.filter.fit import Fit, fit
+from tracker.filter.leap import stands_elsewhere
 from tracker.filter.posterior import settled
 from tracker.filter.predict import Prediction, at_origin
 from tracker.maths.covariance import inverse_of
@@ -99,6 +100,9 @@ def _chosen(ahead: Prediction, seen: Sighted, rig: Rig, probability: float) -> U
             detail = (
                 f"the cameras do not agree on where the balls are, {detail}: has one moved since it was calibrated?"
             )
+        return Rejected(Reason.FRAME_GATE, detail, ahead.state.t_ns)
+    if stands_elsewhere(ahead, seen, best, rig, probability):
+        detail = "the marker stands elsewhere, or a ball lies in several cameras"
         return Rejected(Reason.FRAME_GATE, detail, ahead.state.t_ns)
     for sighting, gain in zip(batch.sighted.sightings, whole.gains() if best is not whole else (), strict=False):
         if not any(sighting is one for one in best.sighted.sightings):
