@@ -94,7 +94,7 @@ class Departure:
 
     def _estimate(self, one: _Waiting, updates: list[Update], rig: Rig, moved_px: Array) -> Estimate:
         state, found = smoothed(updates), updates[0]
-        covariance, sigmas_s = reported(state, rig, one.exposure_s, one.doubts_px, moved_px)
+        covariance, sigmas_s = reported(state, found.spread, rig, one.exposure_s, one.doubts_px, moved_px)
         mean, stages = read_only(state.mean), one.stages
         if self._lag_rounds:
             stages = {**stages, HELD: self._stopwatch() - one.since_ns}

@@ -28,6 +28,7 @@ def test_what_the_eyes_learn_while_a_pose_waits_makes_it_no_surer() -> None:
     departure.take(0, 0, TrackState.TRACKING, 0, {}, eyes)
     eyes.doubts_px = SURE_PX
     (left,) = departure.due(history, RIG, UNMOVED, all_of_them=True)
-    doubted, sure = (reported(found.state, RIG, eyes.exposure_s, px, UNMOVED)[0] for px in (DOUBTED_PX, SURE_PX))
+    told = found.state, found.spread, RIG, eyes.exposure_s
+    doubted, sure = (reported(*told, px, UNMOVED)[0] for px in (DOUBTED_PX, SURE_PX))
     assert np.array_equal(left.covariance, doubted)
     assert np.trace(doubted[:3, :3]) > np.trace(sure[:3, :3])

@@ -40,6 +40,7 @@ POSED = 3  # sightings that make a pose: one fits them whatever they show, and t
 class Update(NamedTuple):
     """An updated state, its NIS and degrees of freedom, what was used and what was left out.
 
+    spread: by how much more the pose's variances are, since its images contradict each other; at least 1.
     P_ahead: the covariance (n, n) of the prediction; None where the state before does not tell of this one: at a start,
         and where a turn was open.
     """
@@ -49,6 +50,7 @@ class Update(NamedTuple):
     dof: int
     used: tuple[BallSighting, ...]
     rejected: tuple[Rejected, ...]
+    spread: float = 1.0
     P_ahead: Array | None = None
 
 
@@ -111,9 +113,10 @@ def _chosen(ahead: Prediction, seen: Sighted, rig: Rig, probability: float) -> U
 
 
 def _updated(ahead: Prediction, best: Fit, rejected: tuple[Rejected, ...]) -> Update:
-    state = at_origin(_posterior(ahead, best), ahead.pivot_inB)
+    told, spread = _posterior(ahead, best)
+    state = at_origin(told, ahead.pivot_inB)
     P_ahead = None if ahead.turn_open or ahead.dt == 0.0 else best.P
-    return Update(state, best.nis, len(best.u), best.sighted.sightings, rejected, P_ahead)
+    return Update(state, best.nis, len(best.u), best.sighted.sightings, rejected, spread, P_ahead)
 
 
 def _fits(one: Fit, probability: float) -> bool:
@@ -205,18 +208,19 @@ def _left_out(sighting: BallSighting, rig: Rig, distance2: float, where: str) ->
     return Rejected(Reason.GATE, f"{name}: {np.sqrt(distance2):.1f} sigma {where}", sighting.t_ns, sighting.camera)
 
 
-def _posterior(ahead: Prediction, best: Fit) -> State:
-    """Take the likeliest state, and the covariance of one linear step there from the prior, by filterpy.
+def _posterior(ahead: Prediction, best: Fit) -> tuple[State, float]:
+    """Take the likeliest state, and the covariance of one linear step there from the prior, by filterpy; and `spread`.
 
     Of a measurement's value that covariance knows nothing, so the step is given none.
     """
     prior, step = ahead.state, _linear_step(len(best.P), get_ident())
     step.x, step.P, step.R = np.zeros((len(best.P), 1)), best.P, best.R
     step.update(0.0, H=best.H)
-    mean, P, noise = settled(
-        prior.mean, best.P, ahead.dt, best.H, best.dx, step.P, prior.noise, best.sighted.cameras, best.u, best.inverse
-    )
-    return State(prior.t_ns, mean, P, best.levels, noise, prior.manoeuvre_s)
+    mean, P, noise, spread = settled(
+        prior.mean, best.P, ahead.dt, best.H, best.R, best.dx, step.P, prior.noise, best.sighted.cameras, best.u,
+        best.inverse,
+    )  # fmt: skip
+    return State(prior.t_ns, mean, P, best.levels, noise, prior.manoeuvre_s), spread
 
 
 @lru_cache(maxsize=8)
