@@ -28,6 +28,7 @@ class Harvest:
         """Take over what an attempt gave that counts."""
         self.sightings += tried.sightings
         self.rejections += tried.rejections
+        self.estimates += tried.estimates
         self.refused += tried.refused
         self.find_ns += tried.find_ns
         self.filter_ns += tried.filter_ns

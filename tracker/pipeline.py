@@ -14,11 +14,12 @@ from types import MappingProxyType
 
 import numpy as np
 
+from tracker.attendance import Attendance
 from tracker.cadence import Cadence
 from tracker.departure import Departure
 from tracker.exposed import Exposed
 from tracker.filter.continuity import Continuity
-from tracker.filter.ekf import POSED, Update
+from tracker.filter.ekf import Update
 from tracker.filter.history import History
 from tracker.filter.predict import Prediction, first_guess, predict
 from tracker.harvest import Harvest
@@ -46,7 +47,6 @@ from tracker.types import (
     TrackState,
 )
 
-POSED_NS = 100_000_000  # longer than this fewer sightings than make a pose carry no track: they fit a mistake as well
 NO_BREAKS: Mapping[int, float] = MappingProxyType({})
 
 
@@ -75,7 +75,7 @@ class Tracker:
         self._exposed = Exposed(rig)
         self._moved_px = np.zeros(len(rig.cameras))
         self._anew = False
-        self._seen_ns: dict[tuple[int, int], int] = {}  # by camera and ball
+        self._attendance = Attendance()
 
     def step(self, event: Event) -> Step:
         """Take one event of the source and return what came of it."""
@@ -159,13 +159,23 @@ class Tracker:
             return
         before = self._history.newest
         known, self._anew = self._track is TrackState.TRACKING and not self._anew, False
-        found = self._follow(frames, t_ns, harvest) if known else None
-        if found is not None and self._hardly_seen(found):
-            found, self._track = None, TrackState.LOST
+        followed, tried = Harvest(), Harvest()
+        found = self._follow(frames, t_ns, followed) if known else None
+        if found is not None:
+            self._attendance.take(found.used, [frame.camera for frame in frames])
+            if self._attendance.hardly_any:
+                found, self._track = None, TrackState.LOST
         if before is None or t_ns >= before.t_ns:
             few = found is None or 2 * len(found.used) < len(frames) * len(self._rig.marker)
-            # The few balls where the track expects them may be something else: look whether the marker is elsewhere.
-            found = (self._search(frames, t_ns, harvest) if few else None) or found
+            if few or self._attendance.fell_silent:  # what is seen may be something else: is the marker elsewhere?
+                elsewhere = self._search(frames, t_ns, tried)
+                if elsewhere is not None:
+                    followed.sightings.clear()
+                elif found is not None:
+                    tried.rejections.clear()
+                found = elsewhere or found
+        harvest.add(followed)
+        harvest.add(tried)
         if found is None or not self._departure.is_news(found.state.t_ns):
             return
         available_ns = max([frame.available_ns for frame in frames])
@@ -267,17 +277,6 @@ class Tracker:
         if found is None:
             return None
         return found._replace(state=found.state.with_clocks(start.offsets_s, start.P[OFFSETS:, OFFSETS:]))
-
-    def _hardly_seen(self, found: Update) -> bool:
-        """Say whether for a while fewer sightings were made than make a pose: what seems another is soon a mistake."""
-        seen_ns = self._seen_ns
-        for sighting in found.used:
-            of, t_ns = sighting[:2], sighting.t_ns
-            if seen_ns.get(of, t_ns) <= t_ns:
-                seen_ns[of] = t_ns
-        newest_ns = max(seen_ns.values())
-        lately = [ball for (_, ball), t_ns in seen_ns.items() if newest_ns - t_ns <= POSED_NS]
-        return len(lately) < POSED or len(set(lately)) < 2
 
     def _still_known(self, start: State) -> State:
         """Return a first guess with what the last track learned of the cameras: their noise and their clocks."""
