@@ -1,4 +1,4 @@
-"""Whether the marker stands elsewhere than the track has it, where a ball is left out that several cameras see.
+"""Whether the marker stands elsewhere than the track has it, where of a ball that several cameras see one is left out.
 
 What lies does so in one camera, mostly. A ball that lies in several must lie where its rays meet, and at the right
 distances from the others; where all sightings show the marker as it is, somewhere else, a thing does just that, or the
@@ -24,13 +24,13 @@ POSE = 6  # figures that such a fit takes up
 
 
 def stands_elsewhere(ahead: Prediction, seen: Sighted, believed: Fit, rig: Rig, probability: float) -> bool:
-    """Say whether a ball is left out that several cameras see, one of them beside itself, and yet all make a marker.
+    """Say whether sightings left out are of balls several cameras see, one beside itself, and yet all make a marker.
 
     seen: what the fit was to be made of.  probability: of a true marker to pass.
     """
-    kept = {one.ball for one in believed.sighted.sightings}
-    left = [one for one in seen.sightings if one.ball not in kept]
-    if len(left) == len({one.ball for one in left}):
+    used, views = believed.sighted.sightings, np.bincount(seen.balls)
+    left = [one for one in seen.sightings if views[one.ball] > 1 and not any(one is other for other in used)]
+    if not left:
         return False
     state = ahead.state.moved(believed.dx)
     opened = np.zeros(len(state.P))
