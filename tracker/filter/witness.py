@@ -28,11 +28,13 @@ def too_lonely(used: Sequence[BallSighting], looking: Iterable[int], balls: int)
     """Say whether an update rests on too little: some of the balls in one camera, where another looked and saw none.
 
     One camera's two balls are four figures for six of a pose, and a thing of a ball's colour makes a pose of its own.
+    Nor do two balls bear each other out where three cameras looked, most of which saw nothing.
 
     Args:
         used: the sightings of one instant.  looking: the cameras that gave a frame of it.  balls: of the marker.
     """
-    return len(used) < balls and len({sighting.camera for sighting in used}) == 1 and len(set(looking)) > 1
+    seeing, asked = len({sighting.camera for sighting in used}), len(set(looking))
+    return len(used) < min(POSED, asked) or (len(used) < balls and seeing == 1 and asked > 1)
 
 
 def doubted_alone(sightings: Sequence[BallSighting], last: State | None) -> tuple[BallSighting, ...]:

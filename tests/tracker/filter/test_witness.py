@@ -65,8 +65,20 @@ def test_one_open_axis_is_enough() -> None:
         (seen((1, 0), (1, 2)), (1,), False),
         (seen((0, 1), (1, 0), (1, 2)), (0, 1), False),
         (seen((2, 0)), (0, 1, 2), True),
+        (seen((1, 0), (2, 2)), (0, 1, 2), True),
+        (seen((1, 0), (2, 2)), (1, 2), False),
+        (seen((0, 1), (1, 0), (2, 2)), (0, 1, 2, 3), False),
     ],
-    ids=["another saw none", "all balls", "no other looked", "another saw one", "one of three"],
+    ids=[
+        "another saw none",
+        "all balls",
+        "no other looked",
+        "another saw one",
+        "one of three",
+        "two of three cameras",
+        "two cameras",
+        "three of four cameras",
+    ],
 )
 def test_some_balls_in_one_camera_are_no_pose_while_another_sees_none(
     used: list[BallSighting], looking: tuple[int, ...], lonely: bool
