@@ -101,18 +101,24 @@ class Outlets:
 
 
 def run(events: Iterable[Event], tracker: Steps, clock: Clock, outlets: Outlets) -> None:
-    """Take every event of a source through tracker and outlets, until there are no more.
+    """Take every event of a source through tracker and outlets, until there are no more, or one fails to come.
 
     Args:
         events: frames in the order they are to be worked on.
         clock: stream time, in the base of the frames' own.
     """
     outlets.links.listen(clock.now_ns)
-    for event in events:
-        if not isinstance(event, Rejected):
-            clock.follow(event)
-        _deliver(event, tracker.step(event), clock, outlets)
-    _deliver(None, tracker.finish(), clock, outlets)
+    amid = False  # an event, so that the tracker holds half of it
+    try:
+        for event in events:
+            amid = True
+            if not isinstance(event, Rejected):
+                clock.follow(event)
+            _deliver(event, tracker.step(event), clock, outlets)
+            amid = False
+    finally:
+        if not amid:
+            _deliver(None, tracker.finish(), clock, outlets)
 
 
 def close(clock: Clock, outlets: Outlets) -> None:

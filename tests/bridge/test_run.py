@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -112,11 +113,32 @@ def test_the_logs_state_is_told_in_a_word(tmp_path: Path, full_disk: Path) -> No
         assert Outlets(outlet(), Monitor(()), log).log_state().startswith("STOPPED: log /dev/full: No space left")
 
 
-def test_an_interrupt_leaves_the_loop_at_once_and_what_was_sent_is_counted() -> None:
-    def interrupted() -> list[Event]:
-        raise KeyboardInterrupt
+def interrupted() -> Iterator[Event]:
+    """Frames and a rejection, amid the wait for more of which the operator presses Ctrl-C."""
+    yield from events()
+    raise KeyboardInterrupt
+
+
+def test_what_the_tracker_still_holds_at_an_interrupt_is_sent_counted_and_logged(tmp_path: Path) -> None:
+    outlets = Outlets(outlet(), Monitor(("cam0", "cam1")), recorder(tmp_path / "a.mcap"))
+    with pytest.raises(KeyboardInterrupt):
+        run(interrupted(), EveryFrame(), StreamClock(), outlets)
+    close(StreamClock(), outlets)
+    assert outlets.summary(None).estimates_sent == 4
+    assert len(list(LogReader(tmp_path / "a.mcap").records({"/estimate"}))) == 4
+
+
+def test_a_tracker_that_was_cut_off_amid_an_event_is_asked_for_nothing_more() -> None:
+    class CutOff(EveryFrame):
+        def step(self, event: Event) -> Step:
+            if len(self.events) == 3:
+                raise KeyboardInterrupt
+            return super().step(event)
+
+        def finish(self) -> Step:
+            raise AssertionError("half of an event is in it")
 
     outlets = Outlets(outlet(), Monitor(("cam0", "cam1")))
     with pytest.raises(KeyboardInterrupt):
-        run((event for source in (events, interrupted) for event in source()), EveryFrame(), StreamClock(), outlets)
-    assert outlets.summary(None).estimates_sent == 3
+        run(events(), CutOff(), StreamClock(), outlets)
+    assert outlets.summary(None).estimates_sent == 1
