@@ -96,9 +96,10 @@ class Study:
         found = self.update(ahead, sightings)
         harvest.find_ns += looked_ns - started_ns
         harvest.filter_ns += self._stopwatch() - looked_ns
-        if isinstance(found, Update) and too_lonely(found.used, [f.camera for f in frames], len(self._rig.marker)):
-            cameras = sorted({sighting.camera for sighting in found.used})
-            detail = f"{len(found.used)} sightings, by camera {' and '.join(map(str, cameras))}, are all that there is"
+        looking = (frame.camera for frame in frames)
+        if isinstance(found, Update) and too_lonely(found.used, looking, len(self._rig.marker)):
+            fitting = ", ".join(f"ball {one.ball} in camera {one.camera}" for one in found.used)
+            detail = f"all that bears a pose out in {len(frames)} pictures: {fitting}"
             found = Rejected(Reason.ALONE, detail, ahead.state.t_ns)
         if isinstance(found, Update) and last is not None and self._unforeseen(found, ahead):
             detail = f"{len(found.used)} sightings make a pose, but it was not known where to look for them"

@@ -33,6 +33,8 @@ def too_lonely(used: Sequence[BallSighting], looking: Iterable[int], balls: int)
     Args:
         used: the sightings of one instant.  looking: the cameras that gave a frame of it.  balls: of the marker.
     """
+    if len(used) >= max(balls, POSED):  # as in nearly every round
+        return False
     seeing, asked = len({sighting.camera for sighting in used}), len(set(looking))
     return len(used) < min(POSED, asked) or (len(used) < balls and seeing == 1 and asked > 1)
 
