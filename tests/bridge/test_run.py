@@ -16,6 +16,7 @@ from bridge.outlet import Outlet, open_outlet
 from bridge.run import Outlets, close, run
 from tests.bridge.estimates import estimate, step
 from tests.bridge.recordings import recorder
+from tracker.errors import OperatorError
 from tracker.types import Event, Frame, Reason, Rejected, Silence, Step, TrackState
 
 IMAGE = np.zeros((2, 2, 3), np.uint8)
@@ -113,16 +114,19 @@ def test_the_logs_state_is_told_in_a_word(tmp_path: Path, full_disk: Path) -> No
         assert Outlets(outlet(), Monitor(()), log).log_state().startswith("STOPPED: log /dev/full: No space left")
 
 
-def interrupted() -> Iterator[Event]:
-    """Frames and a rejection, amid the wait for more of which the operator presses Ctrl-C."""
+def cut_off_by(end: BaseException) -> Iterator[Event]:
+    """Yield frames and a rejection; amid the wait for more of them this happens."""
     yield from events()
-    raise KeyboardInterrupt
+    raise end
 
 
-def test_what_the_tracker_still_holds_at_an_interrupt_is_sent_counted_and_logged(tmp_path: Path) -> None:
+@pytest.mark.parametrize("end", [KeyboardInterrupt(), OperatorError("camera 1: unplugged")], ids=["Ctrl-C", "source"])
+def test_what_the_tracker_still_holds_when_no_more_comes_is_sent_counted_and_logged(
+    end: BaseException, tmp_path: Path
+) -> None:
     outlets = Outlets(outlet(), Monitor(("cam0", "cam1")), recorder(tmp_path / "a.mcap"))
-    with pytest.raises(KeyboardInterrupt):
-        run(interrupted(), EveryFrame(), StreamClock(), outlets)
+    with pytest.raises(type(end)):
+        run(cut_off_by(end), EveryFrame(), StreamClock(), outlets)
     close(StreamClock(), outlets)
     assert outlets.summary(None).estimates_sent == 4
     assert len(list(LogReader(tmp_path / "a.mcap").records({"/estimate"}))) == 4
