@@ -20,6 +20,7 @@ LEAST_AREA_SHARE, MOST_AREA_SHARE = 0.15, 4.0  # of the ball's expected disc
 BESIDE_PX = 1.0  # beyond a ball's radius that it is looked for round a spot's middle
 STEPS, STILL_PX = 5, 0.3  # of the way to a ball's middle: the most of them, and one too short to go on
 FULL = 0.85  # of a square that a ball, which reaches its sides, does not fill
+KEPT = 0.75  # of a spot that the room is taken off: it stands beside the room, not before it
 
 Table = tuple[NDArray[np.int16], NDArray[np.int16], NDArray[np.bool_], int, int]
 """A colour's, as in `tracker.image.colour_table.ColourTable`."""
@@ -38,11 +39,15 @@ def _nearest(spots: Array, view: Array) -> int:
 
 
 @compiled("b1(f8[::1], f8[::1], f8)", inline=True)
-def _is_better(whole: Array, spot: Array, radius_px: float) -> bool:
-    """Say whether a spot with the room is the one without it, and nearer a ball's size."""
-    area = math.pi * radius_px**2
-    one = math.hypot(whole[1] - spot[1], whole[2] - spot[2]) <= radius_px
-    return one and abs(math.log(whole[3] / area)) <= abs(math.log(spot[3] / area))
+def _is_one(whole: Array, spot: Array, radius_px: float) -> bool:
+    """Say whether a spot with the room is the one without it."""
+    return math.hypot(whole[1] - spot[1], whole[2] - spot[2]) <= radius_px
+
+
+@compiled("b1(f8[::1], f8[::1], f8)", inline=True)
+def _is_better(whole: Array, spot: Array, area: float) -> bool:
+    """Say whether a spot with the room is nearer a ball's size than without it."""
+    return abs(math.log(whole[3] / area)) <= abs(math.log(spot[3] / area))
 
 
 _TABLE = "Tuple((Array(i2, 2, 'C', True), Array(i2, 1, 'C', True), Array(b1, 2, 'C', True), i8, i8))"
@@ -84,7 +89,7 @@ def nearest_spot(
 
     Where the room has the ball's colour, what looks as it does is left out. Too little may be left of a ball that is
     like the room or was learned as room; so its spot is looked at with the room, too, and counts so if it is nearer a
-    ball's size.
+    ball's size. A spot that loses hardly anything, as by one pixel beside it, is the ball as it is, whatever its size.
 
     Args:
         image: (height, width, 3) BGR.  room, looks: what is known to stand behind, see `behind.Room`.
@@ -100,7 +105,12 @@ def nearest_spot(
         return (spots[at, 1], spots[at, 2]) if at >= 0 else (np.nan, np.nan)
     whole, _ = find_spots(image, room[:0], looks[:0], left, top, right, bottom, *table, MOST_AREA_SHARE * area)
     other = _nearest(whole, view)
-    if other >= 0 and (at < 0 or _is_better(whole[other], spots[at], view[RADIUS])):
+    if other >= 0 and at < 0:
         return whole[other, 1], whole[other, 2]
+    if other >= 0 and _is_one(whole[other], spots[at], view[RADIUS]):
+        if _is_better(whole[other], spots[at], area):
+            return whole[other, 1], whole[other, 2]
+        if spots[at, 3] >= KEPT * whole[other, 3]:
+            return spots[at, 1], spots[at, 2]
     u, v = (spots[at, 1], spots[at, 2]) if at >= 0 else (view[U], view[V])  # with a tube it may have no ball's shape
     return _densest(image, room, looks, table, u, v, view[RADIUS])

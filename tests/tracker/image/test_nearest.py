@@ -97,3 +97,16 @@ def test_wood_in_other_light_is_not_what_is_known() -> None:
 def test_where_there_is_no_ball_there_is_none_before_wood() -> None:
     image = developed(wooden(), (2.0, np.random.default_rng(1)))
     assert np.isnan(nearest(image, room_of(wooden()))).all()
+
+
+@pytest.mark.parametrize("seen_px", [3.0, 3.8, 4.6])
+@pytest.mark.parametrize("side", [-1.0, 1.0])
+def test_a_little_of_its_colour_beside_a_ball_hides_nothing_of_it(seen_px: float, side: float) -> None:
+    """However much larger than its disc blur makes it."""
+    canvas = empty_canvas(CAMERA)
+    row, column = round(PLACE[1]), round(PLACE[0] + side * (seen_px + 1.0))
+    canvas[row : row + 2, column] = WOOD_BGR
+    with_ball = canvas.copy()
+    draw_ball(with_ball, PLACE, seen_px, ORANGE)
+    image = developed(with_ball, (2.0, np.random.default_rng(0)))
+    assert np.abs(nearest(image, room_of(canvas)) - PLACE).max() < 0.7
