@@ -53,49 +53,74 @@ def _undoing(gain: float) -> int:
 NEUTRAL = Gains()
 
 
+class Paint(NamedTuple):
+    """A ball's own colour: sums over how it was seen, with the light's gains undone.
+
+    blue, red: of log(blue / green) and log(red / green), weighted.  blue_weight, red_weight: of the weights.
+    times: how often it was seen.
+    """
+
+    blue: float = 0.0
+    blue_weight: float = 0.0
+    red: float = 0.0
+    red_weight: float = 0.0
+    times: int = 0
+
+
+UNSEEN = Paint()
+
+
 class Tint(NamedTuple):
     """The colour of the light in one camera.
 
     gains: now.
-    colours: by ball, sums of weight, log(blue / green) weighted and log(red / green) weighted, gains undone, and how
-        often it was seen: the ball's own colour.
+    paints: by ball, its own colour.
     settled: whether the own colour of every ball seen so far is known.
     """
 
     gains: Gains = NEUTRAL
-    colours: Mapping[int, tuple[float, float, float, int]] = MappingProxyType({})
+    paints: Mapping[int, Paint] = MappingProxyType({})
     settled: bool = False
 
     def learned(self, seen: Sequence[tuple[int, Bgr]]) -> Tint:
         """Return what is known after one image.
+
+        To first order the logarithm of a ratio errs by noise / the darker of its two channels, so its weight is that
+        one's square. So little counts the red of a green ball, which is dark and takes on the room's by blur.
 
         Args:
             seen: ball and mean colour of its core, from `core_colour`, for each ball well fitted.
         """
         here = math.log(self.gains.blue), math.log(self.gains.red)
         learned = {}
-        pull = pull_blue = pull_red = 0.0
-        for ball, bgr in seen:
-            ratios = _ratios(bgr)
-            if ratios is None:
+        blue_pull = blue_pulls = red_pull = red_pulls = 0.0
+        for ball, (blue, green, red) in seen:
+            if not min(blue, green, red) >= LEAST_LEVEL:
                 continue
-            weight, blue, red = ratios
-            total, sum_blue, sum_red, count = self.colours.get(ball, (0.0, 0.0, 0.0, 0))
-            if count < LEARN_BALLS:
-                own_blue, own_red = blue - here[0], red - here[1]
-                learned[ball] = total + weight, sum_blue + weight * own_blue, sum_red + weight * own_red, count + 1
+            blue_log, blue_weight = math.log(blue / green), min(blue, green) ** 2
+            red_log, red_weight = math.log(red / green), min(red, green) ** 2
+            paint = self.paints.get(ball, UNSEEN)
+            if paint.times < LEARN_BALLS:
+                learned[ball] = Paint(
+                    paint.blue + blue_weight * (blue_log - here[0]),
+                    paint.blue_weight + blue_weight,
+                    paint.red + red_weight * (red_log - here[1]),
+                    paint.red_weight + red_weight,
+                    paint.times + 1,
+                )
             else:
-                pull += weight
-                pull_blue += weight * (blue - sum_blue / total)
-                pull_red += weight * (red - sum_red / total)
-        colours, settled = self.colours, self.settled
+                blue_pulls += blue_weight
+                blue_pull += blue_weight * (blue_log - paint.blue / paint.blue_weight)
+                red_pulls += red_weight
+                red_pull += red_weight * (red_log - paint.red / paint.red_weight)
+        paints, settled = self.paints, self.settled
         if learned:
-            colours = {**colours, **learned}
-            settled = all(count >= LEARN_BALLS for *_, count in colours.values())
-        if pull == 0.0:
-            return Tint(self.gains, colours, settled)
-        now = _followed(here[0], pull_blue / pull), _followed(here[1], pull_red / pull)
-        return Tint(Gains(math.exp(now[0]), math.exp(now[1])), colours, settled)
+            paints = {**paints, **learned}
+            settled = all(paint.times >= LEARN_BALLS for paint in paints.values())
+        if red_pulls == 0.0:
+            return Tint(self.gains, paints, settled)
+        now = _followed(here[0], blue_pull / blue_pulls), _followed(here[1], red_pull / red_pulls)
+        return Tint(Gains(math.exp(now[0]), math.exp(now[1])), paints, settled)
 
     def other(self, number: int) -> Gains:
         """Return a light near the known one, to look for balls under when none are found.
@@ -109,18 +134,6 @@ class Tint(NamedTuple):
 def _followed(here: float, seen: float) -> float:
     """Return the logarithm of a gain, moved from where it was towards what was seen."""
     return max(-MOST_LOG, min(MOST_LOG, here + FOLLOW_SHARE * (seen - here)))
-
-
-def _ratios(bgr: Bgr) -> tuple[float, float, float] | None:
-    """Return weight, log(blue / green) and log(red / green) of a colour; None where a channel is too dark to tell.
-
-    Source: to first order log x errs by noise / x, so the weight is the square of the darkest channel.
-    """
-    blue, green, red = bgr
-    darkest = min(blue, green, red)
-    if not darkest >= LEAST_LEVEL:
-        return None
-    return darkest * darkest, math.log(blue / green), math.log(red / green)
 
 
 @compiled("UniTuple(f8, 3)(Array(u1, 3, 'C', readonly=True), f8, f8, f8)")

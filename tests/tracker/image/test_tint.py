@@ -68,6 +68,15 @@ def test_a_colour_with_a_black_channel_tells_nothing(level: float) -> None:
     assert tint.learned([(0, (level, 120.0, 130.0))]).gains == tint.gains
 
 
+def test_the_room_shining_into_a_dark_channel_is_no_light() -> None:
+    """Before a red wall a green ball's red, through blur, is half as strong again."""
+    tint = used_to(NEUTRAL)
+    shone = [(ball, (blue + 2.0, green + 2.0, red + 20.0)) for ball, (blue, green, red) in under(NEUTRAL)]
+    for _ in range(8):
+        tint = tint.learned(shone)
+    assert tint.gains.red == pytest.approx(1.0, abs=0.15)
+
+
 def test_absurd_gains_are_held_at_a_limit() -> None:
     tint = used_to(NEUTRAL)
     for _ in range(50):
