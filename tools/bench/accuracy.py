@@ -104,11 +104,14 @@ def compare(yardstick: Yardstick, method: str, steps: Sequence[Step]) -> Accurac
     """Compare estimates with the truth at the same instants.
 
     Raises:
-        OperatorError: no estimate has a true pose at its time.
+        OperatorError: no estimate, or none that has a true pose at its time.
     """
     recording, truth = yardstick.recording, yardstick.truth
     index = {int(t_ns): i for i, t_ns in enumerate(truth.t_ns)}
     estimates = [estimate for step in steps for estimate in step.estimates]
+    if not estimates:
+        remedy = "check colours (`posebridge colours`) and calibration"
+        raise OperatorError(f"{recording}: method {method} found no pose in any frame; {remedy}")
     pairs = [(estimate, index[estimate.t_ns]) for estimate in estimates if estimate.t_ns in index]
     if not pairs:
         raise OperatorError(f"{recording}: no estimate at the time of a true pose; check the ground truth's times")
